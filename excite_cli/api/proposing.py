@@ -119,7 +119,7 @@ def save_proposal(
         # A wrong name is reported at once, and what may be read is asked first.
         _, needed = load_with_folders(source, dirs, folder, xacro_args, allow)
         allowed = {each.folder for each in needed}
-        text = f"looking at {name}: capsules and tables of its meshes take longest, once"
+        text = f"looking at {name}: preparing collision geometry (cached)"
         tell(Note(Level.INFO, text))
         found = propose(
             source,

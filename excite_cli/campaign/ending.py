@@ -38,8 +38,8 @@ def left_on_newest(found: Diagnosis) -> list[str]:
 
 def still_open(found: Diagnosis, pairs: tuple[str, ...]) -> tuple[str, ...]:
     """What still matters, in sentences; `pairs`: effects that a motion could tell apart."""
-    said = [f"{pair}: not told apart yet" for pair in pairs]
-    said += [f"{joint}: more than noise is left of its torque" for joint in found.joints_left]
+    said = [f"{pair}: not distinguished yet" for pair in pairs]
+    said += [f"{joint}: excess residual of the torque" for joint in found.joints_left]
     said += left_on_newest(found)
     said += [
         f"{each.effect.kind} on {place_in_words(each.effect, len(found.joint_names))}: the newest "
@@ -49,7 +49,7 @@ def still_open(found: Diagnosis, pairs: tuple[str, ...]) -> tuple[str, ...]:
         and min((r.relative_moving for r in each.removes.values()), default=0.0) < -_SMALL
     ]
     if not found.good:
-        said.append("what was found does not lower the error on the newest motion")
+        said.append("the effects found do not lower the error on the newest motion")
     return tuple(said)
 
 
@@ -64,21 +64,20 @@ def ended(campaign: Campaign, until: float | None) -> Campaign:
     learned, asked = last.learned, campaign.asked
     lacking = list(learned.open)
     if pace_of(last.number, asked.from_speed) < 1.0:
-        lacking.append("the motions are not played at their own pace yet")
+        lacking.append("no motion has been played at full speed yet")
     if last.number < 2:
-        lacking.append("no motion has looked for what the first ones do not show")
+        lacking.append("no exploration motion has been tested yet")
     elif until is not None and not (learned.torque_deviation or 0.0) <= until:
         lacking.append(
-            f"torques are known to {learned.torque_deviation:.2g} of one sample's noise, and "
-            f"{until:.2g} is asked for"
+            f"predicted-torque standard deviation is {learned.torque_deviation:.2g} σ of one "
+            f"sample, and sequence.until asks for {until:.2g}"
         )
     if not lacking:
         text = (
-            f"Nothing that matters is left: the model, found without {last.motions[-1].name}, "
-            f"predicts it as well as the motions that it was fitted to ({learned.after:.2%} of the "
-            "torque is missed)"
+            f"Converged: the model, identified without {last.motions[-1].name}, predicts that "
+            f"motion at training level (held-out error {learned.after:.2%} of the torque)"
         )
-        told = f", and no effect could be another ({', '.join(learned.effects)})"
+        told = f", without ambiguous effects ({', '.join(learned.effects)})"
         return replace(campaign, ended="complete", reason=text + told * bool(learned.effects) + ".")
     why = ""
     if last.number >= asked.most_rounds:
@@ -101,7 +100,7 @@ def _in_vain(campaign: Campaign) -> Campaign:
     if not pairs or any(len(each.open) > len(each.pairs) for each in learned):
         return campaign
     text = (
-        f"Not finished: {_IN_VAIN} rounds did not tell apart {'; '.join(sorted(pairs))}. Nothing "
+        f"Not finished: {_IN_VAIN} rounds did not distinguish {'; '.join(sorted(pairs))}. Nothing "
         "else is open."
     )
     return replace(campaign, ended="stuck", reason=text)

@@ -63,7 +63,7 @@ def _judged(mass: float, moments: Array, reach: float) -> tuple[Status, str] | N
     if gyration > _LARGE * reach:
         return "doubt", (
             f"moments of inertia of up to {moments[-1]:.3g} kg·m² with {mass:.3g} kg are those of "
-            f"a body {2 * gyration:.2g} m wide; its joints are {reach:.2g} m apart. Are they in "
+            f"a body {2 * gyration:.2g} m wide; its joints span {reach:.2g} m. Are they in "
             "another unit (kg·mm²), or about another frame?"
         )
     return None

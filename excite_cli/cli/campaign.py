@@ -31,7 +31,7 @@ def campaign(
         typer.Option(
             "--inbox",
             rich_help_panel=_MEASURED,
-            help="Folder for people who carry files: motions are laid there, logs awaited.",
+            help="Exchange folder: excite writes motions here and expects their logs here.",
         ),
     ] = None,
     log: Annotated[
@@ -87,7 +87,7 @@ def campaign(
         typer.Option(
             "--plain",
             rich_help_panel=_BUDGET,
-            help="No motions that look for what nobody has found: the model's own alone.",
+            help="Plan no exploration motions for untested candidates.",
         ),
     ] = False,
     effect: Annotated[
@@ -119,19 +119,19 @@ def campaign(
     verbose: options.Verbose = False,
     no_progress: options.NoProgress = False,
 ) -> None:
-    """Plan motions, have them measured, diagnose, and plan the next, until nothing is left.
+    """Plan motions, have them measured, diagnose, and plan the next, until the model converges.
 
     The program of --measure gets a motion (CSV: t, q, v, a, from rest to rest), plays it, and
-    writes a log that the config reads; exit status 0 means measured. Its log must be whole and of
-    that motion; else it is set aside, and the motion tried again. At the limit of time, and at
-    Ctrl-C, all that the program started gets SIGTERM, and SIGKILL 10 s later or at the next Ctrl-C.
-    What people put into the inbox is taken once it is a whole log of the motion, and newer. In
-    every round one motion separates or excites what is known, and one shows what is not known yet;
-    that one takes no part in the diagnosis and judges it.
+    writes a log that the config reads; exit status 0 means measured. A log that is
+    incomplete or of another motion is reported and rejected, and the motion repeated. At the time
+    limit, and at Ctrl-C, all processes of the program get SIGTERM, and SIGKILL 10 s later or at the
+    next Ctrl-C. A file in the inbox is accepted once it is a complete, newer log of the motion. In
+    every round one motion separates or excites the known effects, and one explores untested
+    candidates; the exploration motion is held out of the diagnosis and validates the model.
 
-    It ends when the newest motion is predicted as well as those that the model was fitted to, and
-    no effect found could be another; or when the budget is spent. Exit status 1: something is open,
-    and the answer says what; or a motion was not measured.
+    The campaign ends when the model predicts the newest motion at training level without ambiguous
+    effects, or when the budget is spent. Exit status 1: a question is open, which the answer names,
+    or a motion was not measured.
 
     Everything is in the folder, after every step: campaign.html (the page of all rounds),
     model.yaml (the config with what was found), plans, motions, logs and diagnoses. --resume goes

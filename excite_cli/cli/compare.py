@@ -25,7 +25,7 @@ def compare(
         typer.Option(
             "--covariate",
             metavar="NAME=V,V,…",
-            help="A column to take out, with a value per file; those of the logs are known.",
+            help="Regress out this covariate, with a value per file; columns of logs are known.",
         ),
     ] = None,
     output: Annotated[
@@ -44,12 +44,12 @@ def compare(
     verbose: options.Verbose = False,
     no_progress: options.NoProgress = False,
 ) -> None:
-    """Tell which parameters and effects changed between days, each with its test.
+    """Test which parameters and effects changed between days.
 
-    Every parameter is followed over the files: is there a day since which it is another? What
-    temperature or another column of the log explains is taken out first, where there are days
-    enough. The p-values are corrected for the number of parameters and of days. Of a score, every
-    run is a day; of fits and diagnoses, give two or more: january.h5 february.h5 march.h5.
+    Every parameter is tested for a day since which its value differs. The part that temperature or
+    another column of the log explains is regressed out first, where there are days enough. The
+    p-values are corrected for the number of parameters and of days. Of a score, every run is a day;
+    of fits and diagnoses, give two or more: january.h5 february.h5 march.h5.
 
     Examples:
       excite compare week.h5 -o week.html

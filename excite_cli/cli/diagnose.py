@@ -27,7 +27,7 @@ def diagnose(
         typer.Option(
             "--apply",
             metavar="NEW.yaml",
-            help="Write the config with what was found, if the error on held-out data fell.",
+            help="Write the config with the effects found, if the held-out error fell.",
             rich_help_panel=OUTPUT,
         ),
     ] = None,
@@ -59,7 +59,7 @@ def diagnose(
     """Find what the declared model lacks: friction, springs, payloads, delays and more.
 
     The declared model is fitted to all runs but the held-out one; its residual is traced
-    to named effects, with their size, certainty, and what these data cannot tell them from. The
+    to named effects, with their size, certainty, and indistinguishable alternatives. The
     held-out run is used once, for the error before and after, and for the verdict on every effect.
     A single run is cut into blocks, every third held out. --workers share the runs, with the same
     numbers. Ctrl-C, or diagnosis.max_seconds, ends the search with the answer so far.

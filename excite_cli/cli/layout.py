@@ -53,7 +53,7 @@ def wrapped(text: str, width: int) -> str:
 def copyable(command: str, width: int) -> str:
     """A command line that can be pasted: where it is too long, lines that end in a backslash.
 
-    An option stays together with what it is given, and a quoted name is one word, however long.
+    An option and its value remain on one line, and a quoted name is one word, however long.
     """
     if cell_len(command) <= width:
         return command

@@ -104,20 +104,20 @@ class SelfCollisionSpec(Section):
     )
     shapes: Literal["collision", "visual"] = Field(
         "collision",
-        description="what stands for the links; visual: the visual shapes of links that have no "
-        "collision shapes are taken too",
+        description="shapes that represent the links; visual: the visual shapes of links that have "
+        "no collision shapes are taken too",
     )
     margin: NonNegative = Field(0.01, description="distance kept [m]")
     by_meshes: tuple[tuple[str, str], ...] = Field(
         (),
-        description="pairs of links, at most two joints apart, that are kept apart by tables of "
-        "their meshes' distances instead of their capsules",
+        description="pairs of links, with at most two joints between them, that are checked by "
+        "tables of their meshes' distances instead of their capsules",
     )
     ignore: tuple[tuple[str, str], ...] = Field((), description="pairs of links not to check")
     without_shapes: tuple[str, ...] = Field(
         (),
         description="links whose shapes are left out where their meshes are missing or cannot be "
-        "read: nothing then keeps these links apart, and verdicts say so",
+        "read: collisions of these links are then not checked, and verdicts say so",
     )
 
 

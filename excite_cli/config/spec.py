@@ -79,8 +79,8 @@ class OptimizerSpec(Section):
         4,
         ge=1,
         le=10_000,
-        description="starts tried per motion; the better half goes on after three stages of the "
-        "search, a quarter of those after four",
+        description="starts per motion (multi-start with successive halving: half of the starts "
+        "continue after three stages of the search, a quarter of those after four)",
     )
     tolerance: Positive = Field(
         1e-3, description="change of the (logarithmic) criterion over 8 iterations that ends a run"
@@ -104,7 +104,7 @@ class UntilSpec(Section):
     )
     efficiency: Share | None = Field(
         None,
-        description="share of the information of an instant that freely chosen states could have",
+        description="information efficiency relative to D-optimal free states",
     )
     duration: Positive | None = Field(
         None, description="[s] of all motions; none begins that would exceed it"

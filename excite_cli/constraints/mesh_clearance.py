@@ -36,8 +36,8 @@ class MeshClearance(Constraint):
     @property
     def remarks(self) -> tuple[Note, ...]:
         """Why there are such pairs."""
-        count = f"mesh clearance: {len(self.labels)} pairs kept apart by their meshes"
-        return (Note(Level.DETAIL, f"{count}, since their capsules overlap whatever the posture"),)
+        count = f"mesh clearance: {len(self.labels)} pairs checked by their meshes"
+        return (Note(Level.DETAIL, f"{count}, since their capsules overlap in every posture"),)
 
     def margins(self, states: States) -> Array:
         """Distance less what is kept (T, m) [m], exact up to some centimetres."""

@@ -77,7 +77,7 @@ class Surroundings(Constraint):
             if kept < most
         ]
         if closer:
-            words = "these never get far apart, so half of the farthest distance is kept instead"
+            words = "these pairs are always near, so half of their largest distance is kept instead"
             said.append(Note(Level.INFO, f"{words} of {most:g} m: {'; '.join(closer)}"))
         touching = [
             f"{pair.first} – {pair.second} {reason_in_words(pair.reason)}"

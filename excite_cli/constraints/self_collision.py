@@ -74,8 +74,8 @@ class SelfCollision(Constraint):
         if not loose:
             return (count,)
         warning = (
-            "not guarded, since their capsules overlap whatever the posture "
-            "(links and the share of postures in which their meshes are apart): "
+            "not guarded, since their capsules overlap in every posture "
+            "(links and the share of postures in which their meshes are separated): "
             f"{'; '.join(sorted(loose))}. Look at these with `excite check`, or give slimmer "
             "capsules under constraints.self_collision.capsules."
         )

@@ -24,7 +24,7 @@ from excite_cli.identification.torque_scale import KNOWN_LOAD
 FRICTION = "friction"
 INERTIAS = "inertias"
 _WORTH_SAYING = 0.05  # share of the fall
-_NEARLY_ALL = 0.95
+_ALL = 0.995
 _MOST = 3  # effects beside friction that get a clause of their own
 _PREFIXES = ((1e6, "M"), (1e3, "k"))
 
@@ -63,24 +63,24 @@ def _missing(found: Diagnosis) -> str:
     """What the model misses, by share; of each the place where it is most."""
     if not found.effects:
         if found.complete:
-            return f"Nothing is missing: the declared model leaves {_percent(found)} of the torque."
-        return f"No effect of the catalogue explains what is left ({_percent(found)})."
+            return f"Nothing is missing: the residual is {_percent(found)} of torque RMS."
+        return f"No effect of the catalogue explains the residual ({_percent(found)})."
     if _in_vain(found):
         return (
-            f"What was found ({counted(len(found.effects), 'effect')}) does not lower the error "
+            f"Adding {counted(len(found.effects), 'effect')} does not lower the error "
             f"where joints move ({relative_in_words(found.begins.mean_relative_moving)} before)."
         )
     of_all = shares(found)
     said = []
     friction = of_all.get(FRICTION, 0.0)
     if friction >= _WORTH_SAYING:
-        what = "nearly all" if friction > _NEARLY_ALL else f"{friction:.0%} of what"
+        share = "all" if friction > _ALL else f"{friction:.0%}"
         rubbing = [each for each in found.effects if _rubs(each)]
         which, most = _friction(rubbing, found), _most_friction(rubbing, found)
-        said.append(f"{which} is {what} your model misses{most}.")
+        said.append(f"{which} accounts for {share} of the unmodelled torque{most}.")
     said += [
-        f"On {_place(each, found)}: {title_of(each.effect.kind)} ({_first(each)}), by what was "
-        "weighed."
+        f"On {_place(each, found)}: {title_of(each.effect.kind)} ({_first(each)}), based on "
+        "the known mass."
         for each in found.named
         if _weighed(each)
     ]
@@ -89,15 +89,15 @@ def _missing(found: Diagnosis) -> str:
     fall = found.fall if found.fall > 0.0 else inf
     worth = [each for each in others if each.takes_off >= _WORTH_SAYING * fall]
     for each in sorted(worth, key=lambda each: -each.takes_off)[:_MOST]:
-        share = f"{each.takes_off / fall:.0%} of what it misses"
+        share = f"{each.takes_off / fall:.0%} of the unmodelled torque"
         what = f"{title_of(each.effect.kind)} ({_first(each)}, {share})"
         said.append(f"On {_place(each, found)}: {what}.")
     if not said:
         said.append(
-            f"Your model misses {counted(len(found.effects), 'effect')}, none of them large."
+            f"Your model lacks {counted(len(found.effects), 'effect')}, none of them large."
         )
     elif of_all.get(INERTIAS, 0.0) >= _WORTH_SAYING:
-        said.append(f"Inertias off the URDF's are {of_all[INERTIAS]:.0%}.")
+        said.append(f"Deviations of inertias from the URDF account for {of_all[INERTIAS]:.0%}.")
     return " ".join(said)
 
 
@@ -166,14 +166,14 @@ def _left(found: Diagnosis) -> list[str]:
     if not known:
         return []
     worst = max(known, key=lambda joint: known[joint])
-    text = f"{_percent(found)} of the torque stays"
+    text = f"Residual: {_percent(found)} of torque RMS"
     if known[worst] > 1.5 * found.after.mean_relative_moving:
         text += f", most on {worst} ({relative_in_words(known[worst])})"
     said = [text + "."]
     for each in found.unexplained[:1]:
         words = [covariate_in_words(covariate) for covariate in each.depends_on]
         listed = " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
-        said.append(f"What stays on {each.joint} depends on {listed}.")
+        said.append(f"The residual of {each.joint} depends on {listed}.")
     return said
 
 
@@ -183,11 +183,11 @@ def _next(found: Diagnosis) -> str:
         return ""
     if _in_vain(found):
         warned = sum(each.severity == "warning" for each in found.findings)
-        told = f"what is warned of the data ({counted(warned, 'warning')}) comes first"
-        return f"Next: {told if warned else 'another motion, or longer'}."
+        first_of_all = f"resolve {counted(warned, 'warning')} about the data"
+        return f"Next: {first_of_all if warned else 'record another motion, or a longer one'}."
     open_names = [each for each in found.effects if each.aliases]
     if not open_names:
-        return "Next: go on with the model and its effects (--apply NEW.yaml)."
+        return "Next: use the model with its effects (--apply NEW.yaml)."
     by_motion = [each for each in open_names if not _weighed(each)]
     first = max(
         by_motion or open_names, key=lambda each: 0.0 if isnan(each.takes_off) else each.takes_off
@@ -198,6 +198,7 @@ def _next(found: Diagnosis) -> str:
         names += f" of {place_in_words(other, len(found.joint_names))}"
     if not by_motion:
         return (
-            f"Next: a run with a weighed load ({KNOWN_LOAD}), which tells {names}; no motion does."
+            f"Next: record a run with a known payload ({KNOWN_LOAD}) to distinguish {names}; no "
+            "motion distinguishes them."
         )
-    return f"Next: a motion that tells {names} (excite optimize … --after)."
+    return f"Next: plan a motion that distinguishes {names} (excite optimize … --after)."

@@ -86,8 +86,8 @@ Progress = Callable[[str, int], None]
 _OPEN = Finding(
     "open_setup",
     "warning",
-    "The set-up is in doubt (above): until that is settled, no effect but friction, offsets and "
-    "armature is confirmed. `excite inspect` has the keys",
+    "The set-up is in doubt (above): until the config resolves the doubt, only friction, offsets "
+    "and armature can be confirmed. `excite inspect` lists the config keys",
 )
 
 
@@ -338,8 +338,8 @@ def _noticed(
         yield Finding(
             "one run",
             "warning",
-            f"All names rest on one recording, {training[0].name}: what is left out to test them "
-            "is a part of the same motion. Record a second motion, and names that do not hold go.",
+            f"Only one recording, {training[0].name}: training and test share a motion. Record a "
+            "second motion, so that spurious effects are rejected.",
             training[0].name,
         )
 

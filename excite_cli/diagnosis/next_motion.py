@@ -133,7 +133,7 @@ def plan_after(
         names = [" / ".join(d.pair) for d in wide.separation.directions[::2]]
         said.insert(0, f"the next motion separates what the data cannot: {'; '.join(names)}")
         return NextMotion(wide, problem, prior, "separate", tuple(said))
-    why = "no effect has an alias" if not pairs else "no alias can be separated by a motion"
+    why = "no effects are indistinguishable" if not pairs else "no motion distinguishes the effects"
     count = len(problem.extension.effects)
     beside = f" with its {count} effect{'s' if count > 1 else ''}" if count else ""
     said.insert(0, f"{why}: the next motion excites the model{beside}, on top of the measured data")
@@ -174,7 +174,7 @@ def _on_a_base(diagnosis: Diagnosis, problem: Problem) -> NextMotion:
     said = ["the next motion excites the inertias, on top of the measured data"]
     if diagnosis.effects:
         said.append(
-            f"{len(diagnosis.effects)} effects that were found are kept apart from the inertias, "
+            f"{len(diagnosis.effects)} effects that were found are separated from the inertias, "
             "and not planned for: no column of a motion has their share of the wrench at the base"
         )
     return NextMotion(problem, problem, prior, "excite", tuple(said))

@@ -8,11 +8,11 @@ class Verdict(StrEnum):
 
     ACCEPTED = "accepted"
     NOT_SIGNIFICANT = "not significant"
-    IMPOSSIBLE_SIGN = "impossible sign"
+    IMPOSSIBLE_SIGN = "physically infeasible sign"
     TOO_SMALL = "too small to matter"
     NO_GAIN = "no gain on runs left out"
-    LATER = "later"
-    EXPLAINED = "another explains it"
+    LATER = "deferred"
+    EXPLAINED = "redundant"
 
 
 class HeldOutVerdict(StrEnum):
@@ -25,4 +25,4 @@ class HeldOutVerdict(StrEnum):
     CONFIRMED = "confirmed"
     NOT_CONFIRMED = "not confirmed"
     HARMFUL = "harmful"
-    WEIGHED = "rests on what was weighed"
+    WEIGHED = "based on the known mass"

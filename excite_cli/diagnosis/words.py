@@ -27,14 +27,14 @@ _TELLING = 0.2
 # What may be left, and why that is not sure: noise known, unknown, around reversals.
 _PERHAPS = (
     (
-        "Left, and predicted by nothing",
-        "more than white noise, but noise with a memory could be as large",
+        "Unexplained residual",
+        "larger than white noise, but coloured noise could be as large",
     ),
     (
-        "Left, and predicted by nothing",
-        "the noise is not known: the torque was filtered, or recorded below 50 Hz",
+        "Unexplained residual",
+        "the noise level is unknown: the torque was filtered, or recorded below 50 Hz",
     ),
-    ("Left around reversals", "there joints stick, and fits leave it out"),
+    ("Residual at velocity reversals", "excluded from the fit: stiction"),
 )
 in_symbols = attrgetter("code")  # what a residual depends on, briefly: `q[elbow]`
 _QUANTITIES: dict[Source, str] = {
@@ -132,8 +132,8 @@ def approximation_in_words(
     if found.covariates:
         return f"a function of {', '.join(map(say, found.covariates))}"
     if not found.kind:
-        return "something of which more is left than this explains"
-    return f"something that also looks like {title_of(found.kind)}"
+        return "an effect that this term explains only in part"
+    return f"an effect of similar shape to {title_of(found.kind)}"
 
 
 def rests_in_words(
@@ -147,12 +147,12 @@ def rests_in_words(
     perhaps: dict[tuple[str, str], list[str]] = {each: [] for each in _PERHAPS}
     for rest in found.large_rests:
         left = (
-            f"{rest.rms:.3g} {units[rest.joint]} ({rest.share_of_torque:.1%} of its torque) of "
-            f"{rest.joint}"
+            f"{rest.joint} {rest.rms:.3g} {units[rest.joint]} RMS ({rest.share_of_torque:.1%} of "
+            "its torque)"
         )
         if rest.certain:
-            beside = "" if rest.noise is None else f" beside noise of {rest.noise:.3g}"
-            more.append(f"More than noise: {left} are left{beside}; {_predicted(rest, say)}.")
+            noise = "" if rest.noise is None else f", noise {rest.noise:.3g} {units[rest.joint]}"
+            more.append(f"Excess residual: {left}{noise}; {_predicted(rest, say)}.")
         else:
             why = 2 if rest.at_reversals else int(rest.noise is None)
             perhaps[_PERHAPS[why]].append(left)
@@ -161,13 +161,13 @@ def rests_in_words(
 
 
 def _predicted(rest: LargeRest, say: Callable[[Covariate], str]) -> str:
-    share = f"{rest.predictable:.0%} of its energy can be predicted"
+    share = f"{rest.predictable:.0%} of its energy is predictable"
     if rest.depends_on:
         best = " and ".join(map(say, rest.depends_on))
         return f"{share}, best from {best}; no effect of the catalogue has this form"
     if rest.predictable > _TELLING:
-        return f"{share}, but from no one or two quantities"
-    return "no quantity that was tried predicts it"
+        return f"{share}, but not from one or two quantities"
+    return "no tested quantity predicts the residual"
 
 
 def assumption_in_words(assumed: Assumption) -> str:
@@ -196,7 +196,7 @@ def ends_in_words(part: HeldOutEnds) -> str:
 
 
 def held_out_in_words(named: NamedEffect) -> str:
-    """`confirmed -4.78 pp`: verdict on held-out data, and by how much the error there changes.
+    """`confirmed, 4.78 pp lower`: the verdict on held-out data and the change of that error.
 
     Percentage points of the relative error where the joint moves, of the joint where it changes
     most; that joint is named where the effect is not on it alone.
@@ -209,7 +209,8 @@ def held_out_in_words(named: NamedEffect) -> str:
         return named.verdict
     joint = max(moved, key=lambda name: abs(moved[name]))
     where = "" if named.effect.joints == (joint,) else f" on {joint}"
-    return f"{named.verdict} {-100 * moved[joint]:+.2f} pp{where}"
+    change = 100 * moved[joint]
+    return f"{named.verdict}, {abs(change):.2f} pp {'lower' if change >= 0 else 'higher'}{where}"
 
 
 def settled_in_words(found: Diagnosis) -> list[str]:
@@ -218,15 +219,17 @@ def settled_in_words(found: Diagnosis) -> list[str]:
         return []  # and beside it, no other gain is told
     kinds = dict.fromkeys(each.kind for each in found.absorbed)
     known = [catalogue()[kind] for kind in kinds if kind in catalogue()]
-    return [f"{each.kind} is told by {each.settled_by}." for each in known if each.settled_by]
+    return [
+        f"{each.kind} is identifiable with {each.settled_by}." for each in known if each.settled_by
+    ]
 
 
 def weighed_in_words(found: Diagnosis) -> list[str]:
     """That held-out data are no test of what rests on what was weighed."""
     return [
-        f"{each.effect.kind} on {place_in_words(each.effect, len(found.joint_names))} rests on "
-        f"what was weighed ({KNOWN_MASS}, {KNOWN_LOAD}): other inertias would predict as well "
-        "without it, so that held-out data are no test of it."
+        f"{each.effect.kind} on {place_in_words(each.effect, len(found.joint_names))} is based "
+        f"on the known mass ({KNOWN_MASS}, {KNOWN_LOAD}): other inertias would predict as well "
+        f"without {each.effect.kind}, so held-out data cannot test this effect."
         for each in found.effects
         if each.verdict is HeldOutVerdict.WEIGHED
     ]
@@ -248,7 +251,7 @@ def no_gain_in_words(found: Diagnosis) -> str:
         f"{found.held_out_run})."
     )
     verdict = HeldOutVerdict.HARMFUL if found.harmful else HeldOutVerdict.NOT_CONFIRMED
-    what = "Harmful" if found.harmful else "None is harmful beyond doubt; not confirmed"
+    what = "Harmful" if found.harmful else "No effect is significantly harmful; not confirmed"
     guilty = [each.effect for each in found.effects if each.verdict is verdict]
     if guilty:
         joints = len(found.joint_names)
@@ -262,11 +265,11 @@ def _textbook_is_better(found: Diagnosis) -> str:
     assert found.textbook is not None
     kinds = dict.fromkeys(each.kind for each in found.textbook.effects)
     return (
-        f"The textbook's model predicts {found.held_out_run} better than what was found: "
-        f"{found.textbook.error.mean_relative_moving:.2%} of the torque is left with "
+        f"The textbook model predicts {found.held_out_run} better than the effects found: the "
+        f"residual is {found.textbook.error.mean_relative_moving:.2%} of the torque with "
         f"{', '.join(kinds) or 'nothing added'} on every joint, "
-        f"{found.after.mean_relative_moving:.2%} with what was found (mean over joints, where they "
-        "move)."
+        f"{found.after.mean_relative_moving:.2%} with the effects found (mean over joints, where "
+        "they move)."
     )
 
 

@@ -19,7 +19,7 @@ class CableForce(Effect):
 
     kind: ClassVar = "cable_force"
     title: ClassVar = "force of a cable or hose"
-    signature: ClassVar = "a joint's residual depends on a neighbour's angle, whatever the speed"
+    signature: ClassVar = "a joint's residual depends on a neighbour's angle at any speed"
     function_of: ClassVar = ("position",)
     scope: ClassVar[Scope] = "pair"
     parameters: ClassVar = (

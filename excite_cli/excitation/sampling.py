@@ -54,8 +54,8 @@ def with_sampling(spec: Spec, trajectory: Trajectory) -> Spec:
     if samples * step < duration * (1 - _ROUNDING):
         raise ConfigError(
             f"sampling.constraints: {samples} samples every {step:g} s cover {samples * step:g} s "
-            f"of a trajectory of {duration:g} s; nothing would hold in the rest. Take more samples "
-            "or a larger step, or leave one of the two out."
+            f"of a trajectory of {duration:g} s; the constraints would not hold in the remaining "
+            "time. Take more samples or a larger step, or leave one of the two out."
         )
     sampling = SamplingSpec(cost=cost, constraints=grid)
     return spec.model_copy(update={"sampling": sampling})

@@ -128,7 +128,7 @@ def choose_obstacle_pairs(
         i, j = possible[0]
         raise ConfigError(
             f"constraints.surroundings: nothing is left to check: {capsules[i].name} and "
-            f"{obstacles[j].name} are {reason_in_words(dropped[i, j])}, whatever the posture. "
+            f"{obstacles[j].name} are {reason_in_words(dropped[i, j])} in every posture. "
             f"Correct the place of {obstacles[j].name}, or list the pair under "
             "constraints.surroundings.ignore."
         )

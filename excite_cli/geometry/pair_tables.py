@@ -144,7 +144,7 @@ def require_tabled(
                 f"{where}: both links need collision geometry, and no capsule given by hand."
             )
         if frozenset(pair) in joined_links(robot):
-            raise ConfigError(f"{where}: a joint joins them, so they are not kept apart at all.")
+            raise ConfigError(f"{where}: a joint connects both links, so their contact is allowed.")
         one, two = meshes[pair[0]], meshes[pair[1]]
         joints = len(moved.between(one.joint, two.joint))
         if joints == 0:  # they stand still towards each other
@@ -152,13 +152,13 @@ def require_tabled(
         if joints > 2 or robot.n < 2:
             raise ConfigError(
                 f"{where}: {joints} moved joints are between them; tables of meshes are for one or "
-                "two. Leave the pair out, and their capsules are kept apart."
+                "two. Leave the pair out, so that excite checks their capsules."
             )
         both = (one, two)
         if _distances(robot, both, PairMeshes(*both), robot.posture[None])[0] <= kept:
             raise ConfigError(
                 f"{where}: their meshes are nearer than {kept:g} m at robot.posture. Give a "
-                "posture at which they are apart."
+                "posture at which the meshes are separated."
             )
 
 

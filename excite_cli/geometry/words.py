@@ -5,7 +5,7 @@ from excite_cli.geometry.reasons import DroppedPair, Reason, Standing, Why
 _WHY = {
     Why.SAME_BODY: "same body",
     Why.IGNORED: "ignored in the config",
-    Why.BY_MESHES: "kept apart by their meshes, as configured",
+    Why.BY_MESHES: "checked by their meshes, as configured",
     Why.ADJACENT: "adjacent",
     Why.NEVER_NEAR: "never near",
     Why.MESHES_NEVER_NEAR: "meshes never near",
@@ -39,7 +39,7 @@ def reason_in_words(reason: Reason) -> str:
         figures = [_FIGURES[reason.why].format(reason.distance)]
     if reason.apart:
         links = (f"{each.first} – {each.second} {each.percent}%" for each in reason.apart)
-        figures.append(f"meshes apart: {', '.join(links)}")
+        figures.append(f"meshes separated: {', '.join(links)}")
     return why_in_words(reason.why) + (f" ({'; '.join(figures)})" if figures else "")
 
 
@@ -48,7 +48,7 @@ _FIGURES = {
     Why.MESHES_NEVER_NEAR: "at least {:.3f} m found",
     Why.ALWAYS_TOUCHING: "up to {:.3f} m deep",
     Why.UNGUARDED: "up to {:.3f} m deep",
-    Why.ALWAYS_NEAR: "at least {:.3f} m apart",
+    Why.ALWAYS_NEAR: "distance at least {:.3f} m",
 }
 
 

@@ -11,10 +11,10 @@ _STANDS_OUT = 1.5  # times the typical joint
 
 
 def fixed_by_data(fit: Fit, i: int) -> str:
-    """`yes`, `yes, small` (the fit is as good without it) or `NO`."""
+    """`yes`, `yes (not significant)` (the fit is as good without it) or `NO`."""
     if not fit.identifiable[i]:
         return "NO"
-    return "yes" if fit.essential[i] else "yes, small"
+    return "yes" if fit.essential[i] else "yes (not significant)"
 
 
 def relative_in_words(share: float) -> str:
@@ -55,8 +55,8 @@ def consistency_in_words(fit: Fit) -> str:
     if not consistent.solved:
         return f"No physically consistent set of parameters was found: {consistent.status}."
     return (
-        "A physically consistent set of all standard parameters fits as well but for "
-        f"{max(consistent.cost, 0.0) ** 0.5:.1f} standard deviations."
+        "A physically consistent set of all standard parameters costs "
+        f"{max(consistent.cost, 0.0) ** 0.5:.1f} σ."
     )
 
 
@@ -72,7 +72,7 @@ def above_the_floor(error: Errors, floor: Mapping[str, float] | None) -> str:
     typical, worst = median(ratios.values()), max(ratios, key=lambda joint: ratios[joint])
     stands_out = ratios[worst] > _STANDS_OUT * typical
     return (
-        f"What is left is {typical:.1f} times the noise that repeated periods show"
+        f"The residual is {typical:.1f} times the noise of repeated periods"
         + f" ({worst} {ratios[worst]:.1f} times)" * stands_out
-        + "; about 1 is the best that a model without drift can reach."
+        + "; about 1 is the minimum of a model without drift."
     )

@@ -193,9 +193,9 @@ def _much_left(error: Errors) -> list[Finding]:
         return []
     worst = max(much, key=much.__getitem__)
     text = (
-        f"{much[worst]:.0%} of the torque of {worst} is left on held-out data ({len(much)} "
+        f"{much[worst]:.0%} of the torque of {worst} is unexplained on held-out data ({len(much)} "
         f"joint{'s' * (len(much) > 1)} above {_MUCH_LEFT:.0%}): the declared model lacks "
-        "something. `excite diagnose` looks for what"
+        "an effect. `excite diagnose` searches for it"
     )
     return [Finding("much_left", "warning", text, "", tuple(much))]
 
@@ -206,8 +206,8 @@ def _hardly_moved(found: Fit) -> list[Finding]:
         return []
     more = f" and {len(found.kept) - _TOLD} more" if len(found.kept) > _TOLD else ""
     text = (
-        f"{len(found.kept)} of {found.rank} base parameters hardly show in these data (the URDF "
-        "knows them better even if it is 100% off) and are kept near its values: "
+        f"{len(found.kept)} of {found.rank} base parameters are weakly excited (the URDF would be "
+        "more accurate even if 100% off) and regularised to URDF values: "
         f"{', '.join(found.kept[:_TOLD])}{more}."
     )
     return [Finding("kept", "note", text)]
@@ -224,11 +224,13 @@ def _noticed(found: Fit, hausman: Hausman) -> list[Finding]:
         why = "The declared model lacks something."
         if len(negative) == signed.sum() > 1:
             why = "The sign of the torque may be flipped (measurement.sign)."
-        text = f"{names}: significantly negative, which is physically impossible. {why}"
+        text = f"{names}: significantly negative, which is physically infeasible. {why}"
         findings.append(Finding("negative", "warning", text))
     loose = [name for name, ok in zip(found.names, found.identifiable, strict=True) if not ok]
     if loose:
-        text = f"{len(loose)} of {len(found.names)} parameters are not fixed by these data."
+        text = (
+            f"{len(loose)} of {len(found.names)} parameters are not identifiable from these data."
+        )
         findings.append(Finding("not_identifiable", "note", text))
     unseen = [name for name, std in zip(found.names, found.std, strict=True) if np.isinf(std)]
     if unseen:

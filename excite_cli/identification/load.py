@@ -290,16 +290,16 @@ def _noticed(with_load: Errors, fit_error: float, possible: bool) -> list[Findin
     found = []
     if not possible:
         text = (
-            "no body has this mass, centre and inertia, nor one within their error: what is left "
-            "of the torque is no load alone. Move longer, or identify the robot anew."
+            "mass, centre and inertia are physically infeasible, also within their error: the "
+            "residual is not a payload alone. Move longer, or identify the robot again."
         )
         found.append(Finding("impossible_load", "warning", text))
     left = with_load.mean_relative_moving
     if left > _TIMES_THE_FIT * fit_error:
         text = (
-            f"{left:.1%} of the torque is left beside the load, the fit left {fit_error:.1%} of "
-            "its own: the robot is not what it was, or carries more than a rigid body, and the ± "
-            "below know nothing of that. Identify it anew, on the same day."
+            f"the residual with the payload is {left:.1%} of the torque, that of the fit was "
+            f"{fit_error:.1%}: the robot changed, or carries more than a rigid body, and the ± "
+            "below do not cover this. Identify the robot again, on the same day."
         )
         found.append(Finding("more_than_a_load", "warning", text))
     return found

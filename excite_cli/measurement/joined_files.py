@@ -92,5 +92,5 @@ def _joined(parts: Sequence[tuple[Path, RawRun]], wanted: ReadOptions) -> RawRun
 def _twice(names: str, what: str) -> str:
     return (
         f"{names}: {what} is in more than one of these files. Give the files of one recording "
-        "whose channels are apart, each channel once."
+        "so that each channel is in one file only."
     )

@@ -54,7 +54,7 @@ def disabled_pairs(
     if never:
         notes.append(
             f"{len(never)} pairs that {srdf.path.name if srdf else ''} disables as never in "
-            "contact are kept apart all the same"
+            "contact are checked all the same"
         )
     if unknown:
         names = ", ".join(sorted(unknown)[:6])

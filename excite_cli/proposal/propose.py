@@ -34,8 +34,8 @@ _SECONDS = 60.0
 _MOTIONS = 3
 _DENSITY = 1000.0
 _ASSUMED = (
-    "[kg/m³] the URDF has no masses: its shapes' hulls are taken at this density. Motions show the "
-    "parameters whatever they are; limits of torque are guesses until masses are known"
+    "[kg/m³] the URDF has no masses: its shapes' hulls are taken at this density. Motions excite "
+    "parameters of any size; limits of torque are guesses until masses are known"
 )
 _OF_PAIRS = (("by_meshes",), ("ignore",))
 _OWN_OPTION = {

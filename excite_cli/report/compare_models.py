@@ -23,7 +23,7 @@ def compare_fits(fits: Mapping[str, StoredFit]) -> Section:
         for name, stored in fits.items()
     )
     table = Table(
-        ("file", "held-out run", "training error", "held-out error", "fixed by the data"),
+        ("file", "held-out run", "training error", "held-out error", "identifiable"),
         rows,
         title="Mean relative error of the torque where joints move",
         right=frozenset({2, 3, 4}),

@@ -46,7 +46,7 @@ def _rows(campaign: Campaign) -> tuple[tuple[str, ...], ...]:
         ("trajectory", f"{problem.spec.trajectory.family}, {in_figures(trajectory.duration)} s"),
         ("seed", str(result.seed)),
         ("earlier data", earlier),
-        ("computing time", f"{seconds:.1f} s, {counted(evaluations, 'evaluation')}"),
+        ("computation time", f"{seconds:.1f} s, {counted(evaluations, 'evaluation')}"),
     )
 
 
@@ -58,13 +58,13 @@ def _versions(result: Result) -> Table:
 def _pairs(result: Result) -> Block:
     """Pairs that are kept apart, and those that are not, with the reasons."""
     blocks: list[Block] = [
-        Table(("kept apart",), tuple((pair,) for pair in result.checked_pairs)),
+        Table(("checked",), tuple((pair,) for pair in result.checked_pairs)),
     ]
     if result.dropped_pairs:
         dropped = tuple((pair,) for pair in result.dropped_pairs)
-        blocks.append(Table(("not looked at, and why",), dropped))
+        blocks.append(Table(("not checked, and why",), dropped))
     return Fold(
-        f"{counted(len(result.checked_pairs), 'pair')} kept apart, "
-        f"{len(result.dropped_pairs)} not looked at",
+        f"{counted(len(result.checked_pairs), 'pair')} checked, "
+        f"{len(result.dropped_pairs)} not checked",
         tuple(blocks),
     )

@@ -29,7 +29,7 @@ def dependence_section(found: Diagnosis) -> Section:
     if not sentences:
         sentences.append(
             Text(
-                "No significant dependence on any quantity is left: what remains "
+                "The residual depends significantly on no quantity: the residual "
                 "behaves like noise.",
                 "good",
             )
@@ -43,14 +43,18 @@ def dependence_section(found: Diagnosis) -> Section:
             for chart in _picture(found, found.traces, each, covariate)
         ]
         if pictures:
-            blocks.append(Charts(tuple(pictures), "What is left, over what it depends on"))
+            blocks.append(
+                Charts(
+                    tuple(pictures), "Residual over the quantities on which the residual depends"
+                )
+            )
         blocks.append(_map(found.traces.dependence))
     lead = (
-        "After all effects are in, is what remains of the torque still a function of something? "
-        "Every joint's rest is tried against time, angles, speeds and accelerations of all joints, "
-        "and its own load, direction and history."
+        "With all effects in the model, does the residual torque still depend on a quantity? "
+        "The residual of every joint is tested against time, angles, speeds and accelerations of "
+        "all joints, and its own load, direction and history."
     )
-    return Section("diagnosis-unexplained", "What stays unexplained", tuple(blocks), lead)
+    return Section("diagnosis-unexplained", "Unexplained residual", tuple(blocks), lead)
 
 
 def _map(dependence: Dependence) -> Block:
@@ -58,25 +62,24 @@ def _map(dependence: Dependence) -> Block:
     rows = [int(k) for k in np.argsort(-most, kind="stable")[:_MOST_ROWS] if most[k] >= _SHOWN]
     if not rows:
         return Text(
-            f"No smooth function of a single quantity takes {_SHOWN:.0%} or more off the rest of "
-            "any joint that runs left out confirm."
+            f"No smooth function of a single quantity explains {_SHOWN:.0%} or more of the "
+            "residual of any joint, confirmed by cross-validation over runs."
         )
     j = int(np.argmax(dependence.shares[:, rows[0]]))
     words = (
         f"Of {len(dependence.quantities)} quantities, {len(rows)} explain {_SHOWN:.0%} or more of "
-        f"the rest of some joint, at most {most[rows[0]]:.0%}: "
+        f"the residual of some joint, at most {most[rows[0]]:.0%}: "
         f"{covariate_in_words(dependence.quantities[rows[0]])} for {dependence.joints[j]}."
     )
     return share_map(
-        "Share of the rest that one quantity explains [%]",
+        "Share of the residual that one quantity explains [%]",
         words,
         [covariate_in_words(dependence.quantities[k]) for k in rows],
         dependence.joints,
         dependence.shares[:, rows].T,
         _SHOWN / 2,
-        "Columns: the joint whose torque is left. A share counts as far as runs left out confirm "
-        "it; shares overlap, since quantities of one motion do. Not every one is significant: the "
-        "sentences above say which are.",
+        "Columns: the joint of the residual. Shares are cross-validated over runs; shares overlap, "
+        "since quantities of one motion correlate. The sentences above name the significant ones.",
     )
 
 
@@ -107,7 +110,7 @@ def _picture(found: Diagnosis, traces: Traces, rest: LargeRest, covariate: Covar
         return []
     largest = max(float(np.abs(middle).max()) for _, _, middle in means)
     words = (
-        f"What is left of the torque of {rest.joint}, over the {axis}: means reach "
+        f"Residual torque of {rest.joint}, over the {axis}: means reach "
         f"{largest:.3g} {unit}, the RMS of all is "
         f"{np.sqrt(np.mean(left[known] ** 2)):.3g} {unit}."
     )
@@ -120,9 +123,9 @@ def _picture(found: Diagnosis, traces: Traces, rest: LargeRest, covariate: Covar
     colours: tuple[Colour, ...] = ("vermilion", "blue")
     shown = [np.quantile(left[known], [0.005, 0.995]), *(middle for _, _, middle in means)]
     panel = Panel(
-        f"left [{scaled}]",
+        f"residual [{scaled}]",
         (
-            Series("left", factor * samples, "muted", "dots"),
+            Series("residual", factor * samples, "muted", "dots"),
             *(
                 Series(f"mean {label}".strip(), factor * own, colour, "joined")
                 for colour, (label, _, _), own in zip(colours, means, middles, strict=False)
@@ -131,7 +134,7 @@ def _picture(found: Diagnosis, traces: Traces, rest: LargeRest, covariate: Covar
         span=limits_about(factor * np.concatenate(shown)),
         height=210,
     )
-    title = f"{rest.joint}: left, over {covariate_in_words(covariate)}"
+    title = f"{rest.joint}: residual, over {covariate_in_words(covariate)}"
     return [Plot(title, words, axis, at, (panel,))]
 
 

@@ -23,7 +23,15 @@ from excite_cli.diagnosis.words import (
 )
 from excite_cli.report.page import Block, Section, Table, Text
 
-_COLUMNS = ("effect", "where", "size ± standard deviation", "p", "takes off", "gain", "held_out")
+_COLUMNS = (
+    "effect",
+    "where",
+    "size ± standard deviation",
+    "p",
+    "error reduction",
+    "gain",
+    "held-out error",
+)
 
 
 def found_section(found: Diagnosis) -> Section:
@@ -35,24 +43,27 @@ def found_section(found: Diagnosis) -> Section:
     if large:
         blocks.append(
             Table(
-                (*_COLUMNS, "cannot be told from"),
+                (*_COLUMNS, "indistinguishable from"),
                 tuple(_row(found, each) for each in large),
                 title="What the declared model lacks",
                 right=frozenset({3, 4, 5}),
                 note=(
-                    "takes off: its part of the fall of the mean error on held-out data, averaged "
-                    "over orders of joining, so that all rows add up to it; gain: by which the "
-                    "error on runs left out falls; held out: whether the effect lowers the error "
-                    "on held-out data beside all others, and the change there in percentage points."
+                    "error reduction: Shapley share of the reduction of the mean error on held-out "
+                    "data, so that all rows add up to the total reduction; gain: reduction of the "
+                    "cross-validation error over runs; held-out error: whether the effect lowers "
+                    "the held-out error beside all others, and the change in percentage points."
                 ),
             )
         )
     if small:
         blocks.append(
             Table(
-                (*_COLUMNS, "cannot be told from"),
+                (*_COLUMNS, "indistinguishable from"),
                 tuple(_row(found, each) for each in small),
-                title=f"{len(small)} small ones (each below {SMALL_PART:.0%} of the fall)",
+                title=(
+                    f"{len(small)} small effects (each below {SMALL_PART:.0%} of the error "
+                    "reduction)"
+                ),
                 right=frozenset({3, 4, 5}),
                 folded=True,
             )
@@ -60,9 +71,9 @@ def found_section(found: Diagnosis) -> Section:
     if found.approximations:
         blocks.append(
             Table(
-                (*_COLUMNS, "stands for"),
+                (*_COLUMNS, "likely true form"),
                 tuple(_row(found, each) for each in found.approximations),
-                title="Approximations: they come near something else that is there",
+                title="Surrogate terms (true form unknown)",
                 right=frozenset({3, 4, 5}),
             )
         )
@@ -75,7 +86,7 @@ def found_section(found: Diagnosis) -> Section:
 def verdict(found: Diagnosis) -> str:
     """One sentence: how much was found and what it does to the error."""
     low, high = found.after.interval
-    approximations = counted(len(found.approximations), "approximation")
+    approximations = counted(len(found.approximations), "surrogate term")
     what = counted(len(found.named), "effect")
     what += f" and {approximations}" * bool(found.approximations)
     return (
@@ -133,12 +144,13 @@ def _absorbed(found: Diagnosis) -> Table:
         for each in found.absorbed
     ]
     return Table(
-        ("effect", "where", "would show as"),
+        ("effect", "where", "confounded with"),
         tuple(rows),
-        title=f"Not testable: {len(rows)} would show as other values of parameters",
+        title=f"Not identifiable: {len(rows)} candidates confounded with other parameters",
         note=" ".join(
             [
-                "No data of this kind of motion can tell them from a change of these parameters.",
+                "No data of this kind of motion distinguish these candidates from a change of "
+                "these parameters.",
                 *settled_in_words(found),
             ]
         ),

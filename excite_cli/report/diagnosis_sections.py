@@ -41,14 +41,16 @@ def diagnosis_figures(diagnosis: Diagnosis) -> tuple[KeyFigure, ...]:
         ),
         KeyFigure("effects found", str(len(diagnosis.named)), kinds or _none(diagnosis)),
         KeyFigure(
-            "not told apart",
+            "ambiguous",
             str(open_questions),
-            "effects with another name that fits as well" if open_questions else "every name holds",
+            "effects with indistinguishable alternatives"
+            if open_questions
+            else "every effect is unique",
         ),
         KeyFigure(
             "unexplained",
             counted(len(diagnosis.joints_left), "joint"),
-            ", ".join(diagnosis.joints_left) or "what is left behaves like noise",
+            ", ".join(diagnosis.joints_left) or "the residual behaves like noise",
         ),
         _warnings(diagnosis),
     )
@@ -63,7 +65,7 @@ def _warnings(diagnosis: Diagnosis) -> KeyFigure:
 
 
 def _none(diagnosis: Diagnosis) -> str:
-    return "nothing is missing" if diagnosis.complete else "no name for what is left"
+    return "nothing is missing" if diagnosis.complete else "unexplained residual"
 
 
 def diagnosis_sections(diagnosis: Diagnosis) -> tuple[Section, ...]:
@@ -99,9 +101,9 @@ def _errors(diagnosis: Diagnosis) -> Section:
         "On held-out data; raw: after, on the torque as recorded, without any filter.",
     )
     if diagnosis.skeleton is not None:
-        what = "Relative error that stays where the joint moves, on held-out data"
+        what = "Relative residual where the joint moves, on held-out data"
         robot = robot_chart(
-            "Where it stays", diagnosis.skeleton, diagnosis.joint_names,
+            "Residual by joint", diagnosis.skeleton, diagnosis.joint_names,
             diagnosis.after.relative_moving, what,
         )  # fmt: skip
         (charts, *others) = blocks
@@ -124,8 +126,9 @@ def _in_time(diagnosis: Diagnosis) -> Section:
         ""
         if not traces
         else (
-            "Filtered torque, as the fit sees it. Above what was measured and what the model with "
-            "all effects says, below what it and the declared model leave. Shaded: held out."
+            "Filtered torque, as used in the fit. Above: measured torque and prediction of the "
+            "model with all effects; below: residuals of this and of the declared model. Shaded: "
+            "held out."
         )
     )
     blocks = residuals_in_time(traces, diagnosis.joint_names, torque_units(diagnosis))
@@ -136,17 +139,14 @@ def _next(diagnosis: Diagnosis) -> Section:
     experiment = next_experiment(diagnosis)
     pairs = experiment["pairs"]
     if not pairs:
-        lead = (
-            "Nothing is left to tell apart: the next motion excites the model with the effects "
-            "that were found."
-        )
+        lead = "No effects are ambiguous: the next motion excites the model with the effects found."
         return Section("diagnosis-next", "Next motion", (_command(experiment),), lead)
     rows = tuple((_named(pair["effect"]), _named(pair["alias"])) for pair in pairs)
     lead = (
-        f"{counted(len(rows), 'pair')} of effects fit these data as well as each other. The next "
-        "motion is planned to tell them apart."
+        f"{counted(len(rows), 'pair')} of effects fit these data equally well. The next motion is "
+        "planned to distinguish the effects of each pair."
     )
-    table = Table(("found", "as good on these data"), rows)
+    table = Table(("found", "indistinguishable from"), rows)
     return Section("diagnosis-next", "Next motion", (table, _command(experiment)), lead)
 
 
@@ -165,7 +165,7 @@ def _runs(diagnosis: Diagnosis) -> list[Table]:
         return []
     found = [each.effect for each in diagnosis.effects]
     every = (*diagnosis.declared, *found)
-    uses = (*((name, "training") for name in names), (diagnosis.held_out_run, "held_out"))
+    uses = (*((name, "training") for name in names), (diagnosis.held_out_run, "held-out data"))
     rows = tuple(
         (name, use, ", ".join(_own(each) for each in every if _within(name, each.runs)) or "–")
         for name, use in uses

@@ -47,13 +47,13 @@ def effect_section(found: Diagnosis) -> Section | None:
     if small:
         cards = effect_plots(found, found.traces, small)
         what = counted(len(small), "small effect")
-        text = f"{what} (each below {SMALL_PART:.0%} of the fall of the error)"
+        text = f"{what} (each below {SMALL_PART:.0%} of the error reduction)"
         blocks.append(Fold(text, (Charts(cards),)) if large else Charts(cards))
     lead = (
-        "What the measured torque of the training data holds once everything else in the model is "
-        "taken away, over the quantity that the effect is a function of. If the effect is there, "
-        "the medians (blue, with the middle 80 % of the samples) follow the fitted law; if it were "
-        "not, they would lie about zero. Samples in which the joint stands or reverses are left "
+        "Partial residual: the measured torque of the training data less all other terms of the "
+        "model, over the quantity that the effect is a function of. If the effect is present, the "
+        "medians (blue, with the middle 80 % of the samples) follow the fitted law; otherwise the "
+        "medians lie about zero. Samples in which the joint stands or reverses are left "
         "out, as in the fit."
     )
     return Section("diagnosis-evidence", "Evidence", tuple(blocks), lead)
@@ -105,19 +105,19 @@ def _caption(found: Diagnosis, named: NamedEffect) -> str:
     text = (
         f"{values}. p {p_in_words(named.p_value, named.least_p)}; explains "
         f"{named.share_of_residual:.2%} of the residual; "
-        f"lowers the error on runs left out by {named.gain:.1%}."
+        f"lowers the cross-validation error by {named.gain:.1%}."
     )
     if told := held_out_in_words(named):
-        text += f" On held-out data: {told}."
+        text += f" Held-out error: {told}."
     everything = len(found.joint_names)
     if named.aliases:
         others = [f"{title_of(a.kind)} on {place_in_words(a, everything)}" for a in named.aliases]
-        text += f" These data cannot tell it from: {', '.join(others)}."
+        text += f" Indistinguishable in these data from: {', '.join(others)}."
     for alias in found.joint_aliases:
         text += _jointly(named, alias, everything)
     if named.approximates:
         what = approximation_in_words(named.approximates, covariate_in_words)
-        text += f" An approximation only: it stands for {what}."
+        text += f" A surrogate term; likely true form: {what}."
     return text
 
 
@@ -133,8 +133,11 @@ def _jointly(named: NamedEffect, alias: JointAlias, everything: int) -> str:
     )
     whole = f"it{f' with {company}' if company else ''}"
     if alias.same_torque:
-        return f" {whole.capitalize()} is the same torque as {others}: no motion tells them apart."
-    return f" These data cannot tell {whole} from: {others}."
+        return (
+            f" {whole.capitalize()} produces the same torque as {others}: no motion distinguishes "
+            "them."
+        )
+    return f" In these data {whole} is indistinguishable from: {others}."
 
 
 def _picture(trace: EffectTrace) -> Picture:

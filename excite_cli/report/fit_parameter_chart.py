@@ -11,9 +11,9 @@ from excite_cli.report.rows_chart import Axis, Bar, Form, Mark, Row, rows_chart
 
 _MOST_ROWS = 16
 _FORMS: dict[str, tuple[str, Form, Colour]] = {
-    "yes": ("fixed", "dot", "blue"),
-    "yes, small": ("fixed, small", "ring", "blue"),
-    "NO": ("not fixed", "cross", "vermilion"),
+    "yes": ("identifiable", "dot", "blue"),
+    "yes (not significant)": ("identifiable, not significant", "ring", "blue"),
+    "NO": ("not identifiable", "cross", "vermilion"),
 }
 
 
@@ -33,7 +33,7 @@ def parameter_charts(fit: Fit) -> tuple[Chart, ...]:
 def _chart(fit: Fit, unit: str, rows: Sequence[int], axis: Axis, of: str) -> Chart:
     loose = [fit.names[i] for i in rows if not fit.identifiable[i]]
     words = f"{len(rows)} parameters in {unit} with one standard deviation to either side; " + (
-        f"not fixed by the data: {', '.join(loose)}." if loose else "the data fix all of them."
+        f"not identifiable: {', '.join(loose)}." if loose else "all of them identifiable."
     )
     drawn = [_row(fit, i, axis) for i in rows]
     return rows_chart(f"Parameters [{unit}]{of}", words, axis, drawn, noted="rel. std")

@@ -31,7 +31,7 @@ def fit_figures(stored: StoredFit) -> tuple[KeyFigure, ...]:
             f"all samples {error.mean_relative:.2%}, 95 % interval {low:.2%} to {high:.2%}",
         ),
         KeyFigure(
-            "parameters fixed by the data",
+            "identifiable parameters",
             f"{fixed} of {len(fit.names)}",
             f"{fit.rank} base parameters, {len(fit.names) - fit.rank} of effects",
         ),
@@ -51,7 +51,7 @@ def fit_sections(stored: StoredFit) -> tuple[Section, ...]:
 def _errors(stored: StoredFit) -> Section:
     low, high = stored.error.interval
     blocks = error_blocks(
-        ("training", "held_out"),
+        ("training", "held-out"),
         stored.training_error,
         stored.error,
         by_joint(stored.fit.joint_names, stored.torque_units),
@@ -75,10 +75,10 @@ def parameter_section(fit: Fit) -> Section:
     fixed = int(np.sum(fit.identifiable))
     kept = " The URDF's inertias are kept as a prior." if fit.inertias == "cad" else ""
     lead = (
-        f"The data fix {fixed} of {len(fit.names)} parameters. A full dot: fixed; a hollow one: "
-        "fixed, but so small that the fit is as good without it; a cross with a dashed interval: "
-        "not fixed. Standard deviations respect serial correlation: "
-        f"{fit.count} samples carry the information of {fit.samples:.0f} independent ones.{kept}"
+        f"{fixed} of {len(fit.names)} parameters are identifiable. A full dot: identifiable; a "
+        "hollow dot: identifiable, not significant; a cross with a dashed interval: not "
+        "identifiable. Standard deviations respect serial correlation: "
+        f"the effective sample size is {fit.samples:.0f} of {fit.count}.{kept}"
     )
     return Section("fit-parameters", "Parameters", tuple(blocks), lead)
 
@@ -97,7 +97,7 @@ def _table(fit: Fit) -> Table:
         for i, name in enumerate(fit.names)
     )
     return Table(
-        ("parameter", "value", "std", "relative", "unit", "fixed by the data", "what it groups"),
+        ("parameter", "value", "std", "relative", "unit", "identifiable", "what it groups"),
         rows,
         title="Parameters in figures, and what each base parameter groups",
         right=frozenset({1, 2, 3}),

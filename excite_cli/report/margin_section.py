@@ -126,7 +126,7 @@ def _pairs(problem: Problem) -> list[Block]:
     left = unjudged(problem)
     if left:
         rows = [(f"{pair.first} – {pair.second}", reason_in_words(pair.reason)) for pair in left]
-        title = "Pairs of bodies that are not kept apart"
+        title = "Link pairs that are not checked"
         told.append(Table(("pair", "why"), tuple(rows), title=title, wordy=frozenset({0, 1})))
     return told
 

@@ -50,7 +50,7 @@ def posture_chart(campaign: Campaign) -> Chart:
     else:
         words = (
             f"{name} at {in_figures(at)} s of its first motion, where it has least room; nearest: "
-            f"{near.labels[0]}, {in_figures(1e3 * float(near.distances[0]))} mm apart"
+            f"{near.labels[0]}, distance {in_figures(1e3 * float(near.distances[0]))} mm"
         )
     capsules = " Capsules as the constraints see them." if near is not None else ""
     caption = f"{words}.{capsules} `excite view` plays all motions."

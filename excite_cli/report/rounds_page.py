@@ -58,7 +58,7 @@ def _plot(done: list[Round]) -> Plot:
         [np.nan if x.torque_deviation is None else x.torque_deviation for x in learned]
     )
     errors = Panel(
-        "torque missed [%]",
+        "held-out error [%]",
         (
             Series("declared model", before, "vermilion", "joined"),
             Series("with all effects found", after, "blue", "joined"),
@@ -67,19 +67,19 @@ def _plot(done: list[Round]) -> Plot:
         logarithmic=bool((before > 0).all() and (after > 0).all()),
     )
     precision = Panel(
-        "torques known to [1]",
+        "torque std [σ]",
         (Series("torque deviation", known, "green", "joined"),),
         height=150,
     )
     return Plot(
         "Rounds",
-        f"Of the torque on the newest motion {before[-1]:.2f} % is missed by the declared model, "
-        f"and {after[-1]:.2f} % with all effects found, after {len(done)} rounds.",
+        f"Held-out error on the newest motion: {before[-1]:.2f} % of the torque with the declared "
+        f"model, {after[-1]:.2f} % with all effects found, after {len(done)} rounds.",
         "round",
         numbers,
         (errors, precision) if np.isfinite(known).any() else (errors,),
-        caption="Errors are those on the newest motion of each round, which took no part; torques "
-        "at random states are known to that share of one sample's noise.",
+        caption="Errors are those on the newest motion of each round, which is held out; torque "
+        "std: predicted-torque standard deviation at random states, in σ of one sample.",
         wide=True,
         counted=True,
     )
@@ -105,6 +105,6 @@ def _motions(campaign: Campaign) -> Section:
         for one in campaign.rounds
         for each in one.motions
     )
-    columns = ("motion", "for", "pace", "seconds", "log", "takes that were no log of it")
+    columns = ("motion", "for", "pace", "seconds", "log", "rejected recordings")
     table = Table(columns, rows, right=frozenset({2, 3}), wordy=frozenset({5}))
     return Section("motions", "Motions", (table,))

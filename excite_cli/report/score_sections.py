@@ -18,9 +18,9 @@ def score_figures(score: Score) -> tuple[KeyFigure, ...]:
     return (
         KeyFigure("error on these runs, moving", f"{score.error.mean_relative_moving:.2%}", made),
         KeyFigure(
-            "runs out of what the model allows",
+            "runs beyond the model's tolerance",
             f"{len(score.alarms)} of {len(score.runs)}",
-            "its own residual, in proportion to the torque",
+            "tolerance: residual of the model on its own data, in proportion to the torque",
         ),
     )
 
@@ -49,7 +49,7 @@ def _plot(score: Score) -> Plot:
     )
     alarms = ", ".join(run.name for run in score.alarms) or "none"
     return Plot(
-        "RMS of the residual over what the model allows",
+        "RMS of the residual over the model's tolerance",
         f"Ratio of every joint over {count} runs; alarms: {alarms}.",
         "run",
         np.arange(1.0, count + 1.0),

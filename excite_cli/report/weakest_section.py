@@ -97,7 +97,7 @@ def _direction_table(columns: _Columns, direction: Array) -> Table:
     rest = len(direction) - len(order)
     note = f"The other {rest} make up {100 * left:.0f} %." if rest else ""
     return Table(
-        ("base parameter", "coefficient [–]", "share [–]", "stands for"),
+        ("base parameter", "coefficient [–]", "share [–]", "represents"),
         rows,
         title="The weakest direction",
         right=frozenset({1, 2}),

@@ -101,8 +101,8 @@ def check_mesh_paths(description: RobotDescription, kind: Kind = "collision") ->
     """
     for link, wrong in unusable(description, kind).items():
         left_out = (
-            f", or list {link} under constraints.self_collision.without_shapes: nothing then keeps "
-            "it apart from others"
+            f", or list {link} under constraints.self_collision.without_shapes: collisions of "
+            "this link are then not checked"
         )
         advice = left_out if kind == "collision" else ""
         raise RobotError(f"{description.path.name}: {wrong.words}{advice}.")

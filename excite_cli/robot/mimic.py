@@ -56,7 +56,7 @@ def lost(followers: Mapping[str, Mimic], root: ElementTree.Element) -> tuple[str
     """Sentences on joints that follow what the URDF does not have."""
     known = [joint.get("name", "") for joint in root.findall("joint")]
     return tuple(
-        f"'{name}' mimics '{own.driver}', which is no joint of the URDF: it stays where it is."
+        f"'{name}' mimics '{own.driver}', which is no joint of the URDF: the joint is locked."
         f"{nearest(own.driver, known)}"
         for name, own in followers.items()
         if own.driver not in known

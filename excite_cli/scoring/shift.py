@@ -89,10 +89,12 @@ def with_shift(
     joints, since = ", ".join(shift.joints), runs[shift.first].name
     told = (
         f"since {since} the error of {joints} is {shift.times:.2g} times that of the runs before, "
-        "though the model's own residual allows as much"
+        "though still within the model's tolerance"
     )
     if 2 * count <= len(later):
-        text = f"{told}; nothing that all of these runs have explains it. Did the motion change?"
+        text = (
+            f"{told}; no common cause in these runs explains the increase. Did the motion change?"
+        )
         return list(runs), [Finding("worse_since", "warning", text, since, shift.joints)]
     named = [
         later[k] if not run.alarm and k in later and _first(later[k]) == what else run

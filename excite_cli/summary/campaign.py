@@ -10,19 +10,19 @@ from excite_cli.shown.table import Part, Table
 
 
 def round_in_words(number: int, learned: Learned) -> str:
-    """`round 2: 1.32% → 0.19% of the torque is missed on its newest motion; …`."""
+    """`round 2: held-out error 1.32% → 0.19% of the torque on the newest motion; …`."""
     named = ", ".join(learned.effects) or "no effect"
     left = "; open: " + "; ".join(learned.open) if learned.open else "; nothing is open"
     return (
-        f"round {number}: {learned.before:.2%} → {learned.after:.2%} of the torque is missed on "
-        f"the newest motion, with {named}{left}"
+        f"round {number}: held-out error {learned.before:.2%} → {learned.after:.2%} of the torque "
+        f"on the newest motion, with {named}{left}"
     )
 
 
 def rounds_table(campaign: Campaign) -> Table:
     """A row per round; seconds of motion add up to those of the campaign."""
     return Table(
-        "Rounds (errors: of the torque on the newest motion, which took no part)",
+        "Rounds (errors: of the torque on the newest motion, which is held out)",
         (
             "round",
             "motions",
@@ -31,7 +31,7 @@ def rounds_table(campaign: Campaign) -> Table:
             "efficiency",
             "before",
             "after",
-            "torques known to",
+            "torque std [σ]",
             "effects",
         ),
         tuple(_row(each) for each in campaign.rounds),
@@ -67,8 +67,8 @@ def campaign_answer(campaign: Campaign, folder: Path, written: dict[str, str]) -
     count = len(campaign.motions)
     total = (
         f"{len(campaign.rounds)} rounds, {count} motions, {campaign.seconds:.0f} s of motion. "
-        "(torques known to: share of one sample's noise, at random states; efficiency: what an "
-        "instant tells, as a share of what freely chosen states could)"
+        "(torque std: predicted-torque standard deviation at random states, in σ of one sample; "
+        "efficiency: information efficiency relative to D-optimal free states)"
     )
     files = tuple(f"{what}: {folder / name}" for what, name in written.items())
     data = {

@@ -58,7 +58,7 @@ def diagnosis_answer(
     parts = diagnosis_parts(found, verbose)
     if not verbose:
         rounds = counted(len(found.rounds), "round")
-        parts.append(f"({rounds} of tests; --verbose shows the suspects of each, and why not.)")
+        parts.append(f"({rounds} of tests; --verbose lists the rejected candidates with reasons.)")
     parts += [_next(experiment), next_command(config, place), *files_in_words(files)]
     return Answer(tuple(parts), {**diagnosis_data(found, experiment), "output": files}, found.good)
 
@@ -97,8 +97,8 @@ def _data_in_words(found: Diagnosis) -> str:
     return (
         f"{p['samples']} samples at {p['rate']:.3g} Hz; positions cut off at "
         f"{'no frequency' if cut is None else f'{cut:.3g} Hz'}; joints stand still in up to "
-        f"{standing:.0%} of the samples, which are left out. {p['candidates']} candidates; held "
-        f"out: {found.held_out_run}. Null inflation {p['inflation']:.2f} (corrected)."
+        f"{standing:.0%} of the samples, which the fit excludes. {p['candidates']} candidates; "
+        f"held out: {found.held_out_run}. Null inflation {p['inflation']:.2f} (corrected)."
     )
 
 
@@ -117,9 +117,9 @@ def _round_table(found: Diagnosis, each: Round) -> Table:
     )
     return Table(
         f"Round {each.index}: residual up to {each.residual[worst]:.3g} ({worst}); {each.verdict}",
-        ("suspect", "where", "p", "share", "gain", "verdict"),
+        ("candidate", "where", "p", "share", "gain", "verdict"),
         rows,
-        words=("suspect", "where", "verdict"),
+        words=("candidate", "where", "verdict"),
         bold=tuple(k for k, each in enumerate(each.suspects) if each.verdict is Verdict.ACCEPTED),
     )
 
@@ -137,11 +137,11 @@ def absorbed_parts(found: Diagnosis) -> Parts:
         for each in found.absorbed
     )
     table = Table(
-        "Not testable: these would show as other values of parameters",
-        ("effect", "where", "absorbed by"),
+        "Not identifiable: confounded with other parameters",
+        ("effect", "where", "confounded with"),
         rows,
         left=("effect", "where"),
-        words=("absorbed by",),
+        words=("confounded with",),
     )
     return [table, *settled_in_words(found)]
 
@@ -150,7 +150,7 @@ def _verdict(found: Diagnosis) -> str:
     low, high = found.after.interval
     return (
         f"{counted(len(found.named), 'effect')}"
-        + (f", {counted(len(found.approximations), 'approximation')}" * bool(found.approximations))
+        + (f", {counted(len(found.approximations), 'surrogate term')}" * bool(found.approximations))
         + "; mean error "
         f"{found.before.mean_relative_moving:.2%} → "
         f"{found.after.mean_relative_moving:.2%} where joints move (over all samples "
@@ -162,7 +162,7 @@ def _verdict(found: Diagnosis) -> str:
 def _next(experiment: dict[str, Any]) -> str:
     if experiment["purpose"] == "separate":
         count = len(experiment["pairs"])
-        return f"Next motion: tell apart {count} pair{'s' if count > 1 else ''} of effects:"
+        return f"Next motion: distinguish {count} pair{'s' if count > 1 else ''} of effects:"
     return "Next motion: excite the extended model:"
 
 
@@ -171,7 +171,7 @@ def _in_words(found: Diagnosis) -> str:
     everything = len(found.joint_names)
     effects = ", ".join(what_and_where(each.effect, everything) for each in found.named)
     before, after = found.before.mean_relative_moving, found.after.mean_relative_moving
-    none = "nothing is missing" if found.complete else "no name for what is left"
+    none = "nothing is missing" if found.complete else "unexplained residual"
     return f"{effects or none}; mean error {before:.2%} → {after:.2%}"
 
 

@@ -27,7 +27,7 @@ def smallest_in_words(path: ErrorPath) -> str:
         "--apply NEW.yaml --smallest writes these alone."
     )
     if not path.enough:
-        text += " (Two runs say little of that standard error.)"
+        text += " (Two runs are too few for a reliable standard error.)"
     return text
 
 
@@ -41,7 +41,7 @@ def _table(found: Diagnosis, path: ErrorPath) -> Table:
     )
     return Table(
         "Error with the first effects (left out: of the declared model's; held out: of the torque)",
-        ("effects", "with", "left out", "held_out", ""),
+        ("effects", "with", "left out", "held-out", ""),
         rows,
         left=("with", ""),
         bold=(path.smallest,),

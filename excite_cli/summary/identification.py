@@ -40,7 +40,7 @@ def identification_parts(found: Identification) -> Parts:
     sentences = [
         f"Mean relative error on {found.held_out_run}: {found.error.mean_relative:.2%} "
         f"(95 % interval {low:.2%} to {high:.2%}), moving {found.error.mean_relative_moving:.2%}.",
-        f"{fit.count} samples carry the information of {fit.samples:.0f} independent ones.",
+        f"Effective sample size: {fit.samples:.0f} of {fit.count}.",
         f"{found.hausman.sentence()[0].upper()}{found.hausman.sentence()[1:]}.",
     ]
     if fit.consistent is not None:
@@ -67,8 +67,8 @@ def _parameter_table(fit: Fit) -> Table:
         )
         for i, name in enumerate(fit.names)
     )
-    names = ("parameter", "value", "std", "relative", "unit", "fixed by the data")
-    return Table("Parameters", names, rows, left=("parameter", "unit", "fixed by the data"))
+    names = ("parameter", "value", "std", "relative", "unit", "identifiable")
+    return Table("Parameters", names, rows, left=("parameter", "unit", "identifiable"))
 
 
 def _error_table(found: Identification | StoredFit) -> Table:
@@ -163,9 +163,7 @@ def _fit_in_words(fit: Fit) -> str:
         f"{effect.kind}@{','.join(fit.joint_names[j] for j in effect.joints)}"
         for effect in fit.effects
     )
-    words = (
-        f"{len(fit.names)} parameters ({known} fixed by the data) of {len(fit.joint_names)} joints"
-    )
+    words = f"{len(fit.names)} parameters ({known} identifiable) of {len(fit.joint_names)} joints"
     return words + (f"; {effects}" if effects else "")
 
 

@@ -8,10 +8,17 @@ from excite_cli.identification.link_changes import Change, LinkChange
 from excite_cli.shown.table import Parts, Table
 
 _TITLE = (
-    "Links that are not as in the URDF (± one standard deviation; centre of mass in the link's "
-    "frame)"
+    "Links deviating from the URDF (± one standard deviation; centre of mass in the link's frame)"
 )
-_COLUMNS = ("link", "mass [kg]", "URDF", "centre [mm]", "URDF's", "by the data", "impossible")
+_COLUMNS = (
+    "link",
+    "mass [kg]",
+    "URDF",
+    "centre [mm]",
+    "URDF's",
+    "identified",
+    "physically infeasible",
+)
 
 
 def link_parts(links: Sequence[LinkChange]) -> Parts:
@@ -25,9 +32,13 @@ def link_parts(links: Sequence[LinkChange]) -> Parts:
         "centre within two standard deviations of the URDF's."
     )
     rows = tuple(_row(link) for link in shown)
-    left = ("link", "by the data", "impossible")
+    left = ("link", "identified", "physically infeasible")
     return [
-        *([Table(_TITLE, _COLUMNS, rows, left=left, words=("impossible",))] if rows else []),
+        *(
+            [Table(_TITLE, _COLUMNS, rows, left=left, words=("physically infeasible",))]
+            if rows
+            else []
+        ),
         *([counted] if others else []),
     ]
 

@@ -81,13 +81,13 @@ def ending_in_words(
         needed = seconds * (found.torque_deviation / most) ** 2
         told = f" (about {needed:.2g} s of motions like these would do)" if alone else ""
         lacking.append(
-            f"torques are predicted to {found.torque_deviation:.2g} of the noise of one sample "
+            f"predicted-torque standard deviation is {found.torque_deviation:.2g} σ of one sample "
             f"instead of {most:g}{told}"
         )
     if least is not None and found.efficiency is not None and found.efficiency < least:
         lacking.append(
-            f"an instant holds {100 * found.efficiency:.2g} % of the information that freely "
-            f"chosen states could have instead of {100 * least:g} % (wider limits, or a trajectory "
+            f"information efficiency is {100 * found.efficiency:.2g} % relative to D-optimal free "
+            f"states instead of {100 * least:g} % (wider limits, or a trajectory "
             "with more coefficients, may do)"
         )
     return f"sequence.until is NOT REACHED with {total}: {'; '.join(lacking)}."
@@ -102,15 +102,15 @@ def result_parts(result: Result) -> Parts:
 def invariants_in_words(found: Invariants) -> str:
     """Figures that are the same whichever columns are called base parameters."""
     words = (
-        "Whatever is called base parameters: torques at random states within the limits are "
-        f"predicted to {found.torque_deviation:.2g} of the noise of one sample (RMS)"
+        f"Predicted-torque standard deviation: {found.torque_deviation:.2g} σ of one sample (RMS "
+        "at random states, independent of the choice of base parameters)"
     )
     if found.efficiency is None or found.slack is None:
         return f"{words}."
     low = found.efficiency * np.exp(-found.slack)
     return (
-        f"{words}, and an instant holds {100 * low:.2g} to {100 * found.efficiency:.2g} % of the "
-        "information that freely chosen states could have (D-efficiency)."
+        f"{words}. Information efficiency: {100 * low:.2g} to {100 * found.efficiency:.2g} % "
+        "relative to D-optimal free states."
     )
 
 
@@ -161,15 +161,15 @@ def margin_table(motions: Sequence[Motion]) -> Table:
 
 def outlook_table(outlook: dict[str, Any]) -> Table:
     """What the motions are expected to tell apart."""
-    title = f"Expected divergence ½Δ; from {outlook['told_apart_from']:g} on, told apart"
-    names = ("effect", "alias", "so far", "then", "motions needed")
+    title = f"Expected divergence ½Δ (distinguishable from {outlook['told_apart_from']:g} on)"
+    names = ("effect", "indistinguishable from", "so far", "then", "motions needed")
     rows = []
     for pair in outlook["pairs"]:
         needed = pair["motions_needed"]
         figures = (f"{pair['kl_so_far']:.2g}", f"{pair['expected_kl']:.3g}")
         count = "> 1000" if needed is None else str(needed)
         rows.append((pair["effect"], pair["alias"], *figures, count))
-    return Table(title, names, tuple(rows), words=("effect", "alias"))
+    return Table(title, names, tuple(rows), words=("effect", "indistinguishable from"))
 
 
 def motion_sentence(motion: Motion) -> str:

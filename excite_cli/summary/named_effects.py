@@ -38,8 +38,8 @@ def effect_parts(found: Diagnosis, verbose: bool) -> Parts:
             for each in small
         )
         parts.append(
-            f"and {len(small)} small ones (each below {SMALL_PART:.0%} of the fall): {listed} "
-            "(--verbose: sizes)"
+            f"and {len(small)} small effects (each below {SMALL_PART:.0%} of the error reduction): "
+            f"{listed} (--verbose: sizes)"
         )
     parts += weighed_in_words(found)
     parts += [text for each in named for text in other_names(each, everything)]
@@ -71,11 +71,18 @@ def effect_table(shown: Sequence[NamedEffect], everything: int, verbose: bool) -
         for named in shown
     )
     return Table(
-        "What the declared model lacks (takes off: its part of the fall of the mean error)",
-        ("effect", "where", _SIZE, *(["p"] if verbose else []), "takes off", "held_out"),
+        "What the declared model lacks (error reduction: Shapley share, held-out data)",
+        (
+            "effect",
+            "where",
+            _SIZE,
+            *(["p"] if verbose else []),
+            "error reduction",
+            "held-out error",
+        ),
         rows,
         left=("effect",),
-        words=("where", _SIZE, "held_out"),
+        words=("where", _SIZE, "held-out error"),
     )
 
 
@@ -84,9 +91,9 @@ def other_names(named: NamedEffect, everything: int) -> list[str]:
     what, found = what_and_where(named.effect, everything), []
     if named.aliases:
         others = ", ".join(what_and_where(alias, everything) for alias in named.aliases)
-        found.append(f"{what} cannot be told from: {others}")
+        found.append(f"{what} is indistinguishable from: {others}")
     if same := other_name_of(named.effect.kind):
-        found.append(f"{what} is the same torque as {' and '.join(same)}")
+        found.append(f"{what} produces the same torque as {' and '.join(same)}")
     return found
 
 
@@ -96,8 +103,8 @@ def _joint_alias(alias: JointAlias, everything: int) -> str:
         for side in (alias.named, alias.others)
     )
     if alias.same_torque:
-        return f"{named} is the same torque as {others}: no motion tells them apart"
-    return f"{named} cannot be told from: {others}"
+        return f"{named} produces the same torque as {others}: no motion distinguishes them"
+    return f"{named} is indistinguishable from: {others}"
 
 
 def what_and_where(record: EffectRecord, everything: int) -> str:
@@ -137,9 +144,9 @@ def _approximation_table(shown: Sequence[NamedEffect], everything: int) -> Table
         for each in shown
     )
     return Table(
-        "Approximations: they come near something else that is there",
-        ("effect", "where", _SIZE, "takes off", "held_out", "stands for"),
+        "Surrogate terms (true form unknown)",
+        ("effect", "where", _SIZE, "error reduction", "held-out error", "likely true form"),
         rows,
         left=("effect",),
-        words=("where", _SIZE, "held_out", "stands for"),
+        words=("where", _SIZE, "held-out error", "likely true form"),
     )

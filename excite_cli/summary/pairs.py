@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from excite_cli.constraints.obstacle_clearance import Surroundings
 from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.reasons import DroppedPair, Why
@@ -60,19 +61,21 @@ def pairs_in_words(problem: Problem) -> list[str]:
     left = unjudged(problem)
     told = "; ".join(dropped_in_words(pair) for pair in left[:_TOLD])
     more = f"; and {len(left) - _TOLD} more (--json has all)" if len(left) > _TOLD else ""
-    names = f" Not kept apart: {told}{more}." if left else ""
+    names = f" Not checked: {told}{more}." if left else ""
     return [*unguarded_in_words(problem), *(f"{each}{names}" for each in counted(problem))]
 
 
 def counted(problem: Problem) -> list[str]:
-    """How many pairs verdicts speak of, in one sentence; empty where there are none."""
+    """How many pairs are checked, in one sentence; empty where there are none."""
     kept, left = kept_apart(problem), len(unjudged(problem))
     if not kept and not left:
         return []
-    words = f"Verdicts speak of {kept} of {kept + left} pairs of bodies"
+    around = any(isinstance(each, Surroundings) for each in problem.constraints)
+    what = "Collision: {} pairs" if around else "Self-collision: {} link pairs"
     bare = not_guarded(problem) or links_without_shapes(problem)
-    of = " of those that have shapes" if bare else ""
-    return [f"{words}." if left else f"{words}, all{of} that could come near each other."]
+    shaped = " with collision shapes" if bare else ""
+    many = f"{kept} of {kept + left} relevant" if left else f"all {kept} relevant"
+    return [f"{what.format(many)}{shaped} checked."]
 
 
 def unguarded_in_words(problem: Problem) -> list[str]:
@@ -83,15 +86,15 @@ def unguarded_in_words(problem: Problem) -> list[str]:
     sentences = []
     if bare:
         sentences.append(
-            f"NOT GUARDED: what moves with {told} has no collision geometry, so no verdict speaks "
-            "of it. Add <collision> to the URDF, take the links' visual shapes "
+            f"NOT GUARDED: what moves with {told} has no collision geometry and is not "
+            "checked. Add <collision> to the URDF, take the links' visual shapes "
             "(constraints.self_collision.shapes: visual), or give capsules of your own "
             "(constraints.self_collision.capsules)."
         )
     if without:
         sentences.append(
             f"NOT GUARDED: the meshes of {', '.join(without)} are missing or cannot be read "
-            "(constraints.self_collision.without_shapes), so no verdict speaks of these links. "
+            "(constraints.self_collision.without_shapes), so these links are not checked. "
             "Give the folder of their package under robot.package_dirs, or capsules of your own "
             "(constraints.self_collision.capsules)."
         )

@@ -48,7 +48,7 @@ def problem_notes(problem: Problem) -> Iterator[Note]:
         yield from _constraint(constraint)
     around = problem.spec.constraints.surroundings
     if around is not None and not any(c.drawing.obstacles for c in problem.constraints):
-        yield _said("surroundings: no link can come near any of them, so nothing is checked")
+        yield _said("surroundings: no link can reach them, so nothing is checked")
     if robot.payload is not None:
         yield _detail(f"payload: {robot.payload.in_words}, part of the predicted torque")
     for name, words in zip(_symbols(problem), problem.base.in_words(), strict=True):

@@ -36,13 +36,13 @@ def sentences(found: Score) -> list[str]:
     if found.made is None:
         return [first]
     if not found.alarms:
-        return [f"{first} No run leaves what its own residual allows.", *_not_judged(found)]
+        return [f"{first} All runs are within the model's tolerance.", *_not_judged(found)]
     told = [f"{run.name}: {in_words(run, found)}" for run in found.alarms[:_TOLD]]
     more = len(found.alarms) - _TOLD
     if more > 0:
         told.append(f"and {more} more: see the table")
     count = f"{len(found.alarms)} of {len(found.runs)}"
-    alarm = f"{count} runs leave what its own residual allows. {'. '.join(told)}."
+    alarm = f"{count} runs exceed the model's tolerance. {'. '.join(told)}."
     return [alarm, first, *_not_judged(found)]
 
 
@@ -54,14 +54,14 @@ def _not_judged(found: Score) -> list[str]:
     more = f" and {len(names) - _TOLD} more" if len(names) > _TOLD else ""
     return [
         f"Not judged: {', '.join(names[:_TOLD])}{more}. Joints stand there, or move more slowly "
-        "than in the model's own data, and friction may explain all that is left."
+        "than in the model's own data, so friction may explain the whole residual."
     ]
 
 
 def in_words(run: ScoredRun, found: Score) -> str:
     """What explains a run, or that nothing does."""
     if not run.left:
-        return "as the model allows"
+        return "within the model's tolerance"
     beyond = _beyond(run)
     if not run.reasons:
         return f"{beyond}; nothing that changes from day to day explains it"
@@ -70,7 +70,7 @@ def in_words(run: ScoredRun, found: Score) -> str:
 
 def _beyond(run: ScoredRun) -> str:
     worst = max(run.left, key=lambda joint: max(run.ratio[joint], run.peak[joint] / 2.5))
-    return f"{run.ratio[worst]:.2g} times what is allowed on {worst}"
+    return f"{run.ratio[worst]:.2g} times the tolerance on {worst}"
 
 
 def _reason(reason: Reason, found: Score) -> str:
@@ -96,7 +96,7 @@ def runs_table(found: Score) -> Table:
         for run in found.runs
     )
     return Table(
-        "Runs: error of the torque, beside what the model's own residual allows",
+        "Runs: error of the torque against the model's tolerance",
         ("run", "seconds", "where moving", "all samples", "ratio", "state", "likely reason"),
         rows,
         left=("run", "state"),
@@ -193,13 +193,15 @@ def _run_data(run: ScoredRun, found: Score) -> dict[str, Any]:
 
 
 def _run_in_words(run: ScoredRun) -> str:
-    """`monday: 1.2% of the torque; as the model allows`, as far as the run itself knows."""
-    state = _beyond(run) if run.left else "as the model allows" if run.judged else "not judged"
+    """`monday: 1.2% of the torque; within the model's tolerance`."""
+    state = (
+        _beyond(run) if run.left else "within the model's tolerance" if run.judged else "not judged"
+    )
     return f"{run.name}: {percent(run.error.mean_relative_moving)} of the torque; {state}"
 
 
 def _run_parts(run: ScoredRun) -> Parts:
-    names = ("joint", "where moving", "RMS", "beyond friction", "allowed", "ratio")
+    names = ("joint", "where moving", "RMS", "beyond friction", "tolerance", "ratio")
     rows = tuple(
         (
             joint,

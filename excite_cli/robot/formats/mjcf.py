@@ -192,7 +192,7 @@ class _Writer:
         joints, above = self._movable(body), self._body(parent)
         if any(kind == _BALL for kind in self._types(body)):
             name = self._body(body)
-            self.notes.append(f"the ball joint of {name} stays where it is: one angle per joint")
+            self.notes.append(f"the ball joint of {name} is locked: one angle per joint")
         if not joints:
             self._joint(f"{self._body(body)}_fixed", "fixed", above, self._body(body), place, turn)
             return

@@ -235,7 +235,9 @@ class _Writer:
         element, parent = self.joints[name], self._parent(child)
         kind = _KINDS.get(element.get("type", ""), "")
         if not kind:
-            self.notes.append(f"{name} stays where it is, of type {element.get('type')}")
+            self.notes.append(
+                f"{name} is locked: joints of type {element.get('type')} are not supported"
+            )
             kind = "fixed"
         axis = element.find("axis")
         limit = None if axis is None else axis.find("limit")
