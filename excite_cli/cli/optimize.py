@@ -84,8 +84,8 @@ def optimize(
 
     Every stored motion keeps all constraints. With --after, the motion distinguishes the effects
     that the diagnosis could not; if there are none, the motion excites the model with all effects
-    found, on top of the measured data. Exit status 1: no admissible motion exists or was found, and the message
-    names the constraint that prevents it.
+    found, on top of the measured data. Exit status 1: no admissible motion exists or was found, and
+    the message names the constraint that prevents it.
 
     With --for payload the motion is the shortest that identifies mass, centre and inertia of a
     payload, given a fit of the robot alone; its config is written beside the result (.yaml).
