@@ -114,12 +114,14 @@ def _names(first: Diagnosed) -> list[str]:
     parts += approximation_parts(found, verbose=False)
     parts += [friction_table(found.friction_lines)] if found.friction_lines else []
     tables = [part for part in parts if isinstance(part, Table)]
-    small = [part for part in parts if isinstance(part, str) and "cannot be told" not in part]
-    doubts = [part for part in parts if isinstance(part, str) and "cannot be told" in part]
+    small = [
+        part for part in parts if isinstance(part, str) and "indistinguishable from" not in part
+    ]
+    doubts = [part for part in parts if isinstance(part, str) and "indistinguishable from" in part]
     return [
         "## Names",
         *map(as_markdown, [*tables[:1], *small, *tables[1:]] if found.named else [*small, *tables]),
-        *([f"What these data cannot tell apart:\n\n{bullets(doubts)}"] if doubts else []),
+        *([f"Indistinguishable in these data:\n\n{bullets(doubts)}"] if doubts else []),
         *_pictures(first, "friction", "All friction of each joint over its speed"),
         *_pictures(first, "effects_1", "Evidence of the largest effects, one by one"),
     ]
@@ -133,7 +135,7 @@ def _after(first: Diagnosed) -> list[str]:
         *_pictures(first, "errors", "Errors of every joint before and after"),
         *map(escaped, map(ends_in_words, found.parts)),
         *map(as_markdown, path_parts(found, False)),
-        *_pictures(first, "after_", "Measured torque, the model with what was found, the rest"),
+        *_pictures(first, "after_", "Measured torque, the model with what was found, the residual"),
     ]
 
 

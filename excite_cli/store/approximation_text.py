@@ -8,7 +8,8 @@ from excite_cli.diagnosis.records import Approximation
 from excite_cli.diagnosis.words import approximation_in_words
 from excite_cli.effects.catalogue import catalogue
 
-_FUNCTION, _LOOKS_LIKE = "a function of ", "something that also looks like "
+_FUNCTION = "a function of "
+_SIMILAR = ("an effect of similar shape to ", "something that also looks like ")  # today, in 0.2
 
 
 def approximation_as_data(found: Approximation | None) -> dict[str, Any]:
@@ -36,8 +37,8 @@ def approximation_of(data: Mapping[str, Any]) -> Approximation | None:
         return Approximation(_covariates(given["covariates"]), str(given["kind"]))
     if told.startswith(_FUNCTION):
         return Approximation(_covariates(told.removeprefix(_FUNCTION).split(", ")))
-    if told.startswith(_LOOKS_LIKE):
-        title = told.removeprefix(_LOOKS_LIKE)
+    if told.startswith(_SIMILAR):
+        title = told.removeprefix(_SIMILAR[0]).removeprefix(_SIMILAR[1])
         kinds = [kind for kind, effect in catalogue().items() if effect.title == title]
         return Approximation(kind=kinds[0] if kinds else title)
     return None

@@ -74,7 +74,7 @@ def counted(problem: Problem) -> list[str]:
     what = "Collision: {} pairs" if around else "Self-collision: {} link pairs"
     bare = not_guarded(problem) or links_without_shapes(problem)
     shaped = " with collision shapes" if bare else ""
-    many = f"{kept} of {kept + left} relevant" if left else f"all {kept} relevant"
+    many = f"{kept} of {kept + left} relevant" if left or kept == 1 else f"all {kept} relevant"
     return [f"{what.format(many)}{shaped} checked."]
 
 

@@ -28,7 +28,7 @@ def found() -> Diagnosis:
 
 def test_nothing_is_open_where_the_newest_motion_is_predicted(found: Diagnosis) -> None:
     assert still_open(found, ()) == ()
-    assert still_open(found, ("a or b",)) == ("a or b: not told apart yet",)
+    assert still_open(found, ("a or b",)) == ("a or b: not distinguished yet",)
 
 
 @pytest.mark.parametrize(
@@ -51,13 +51,13 @@ def test_what_is_missed_on_the_newest_motion(
 
 def test_structure_that_is_left_is_open(found: Diagnosis) -> None:
     left = replace(found, large_rests=make_diagnosis().large_rests)
-    assert still_open(left, ()) == ("elbow: more than noise is left of its torque",)
+    assert still_open(left, ()) == ("elbow: excess residual of the torque",)
 
 
 def test_what_does_not_lower_the_error_is_open(found: Diagnosis) -> None:
     useless = replace(found, before=found.after)
     worse = replace(useless, after=errors(0.011, 0.1, found.joint_names))
-    assert "what was found does not lower the error on the newest motion" in still_open(worse, ())
+    assert "the effects found do not lower the error on the newest motion" in still_open(worse, ())
 
 
 @pytest.mark.parametrize(("worse", "open_"), [(0.01, True), (0.001, False)])
@@ -91,14 +91,14 @@ def campaign(
 
 
 NOTHING: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
-PAIR = (("a or b: not told apart yet",), ("a or b",))
+PAIR = (("a or b: not distinguished yet",), ("a or b",))
 
 
 def test_it_ends_once_a_motion_looked_for_more_and_nothing_is_open() -> None:
     assert ended(campaign(NOTHING), None).ended == ""
     done = ended(campaign(NOTHING, NOTHING), None)
     assert done.ended == "complete"
-    assert "found without r2_m2" in done.reason
+    assert "identified without r2_m2" in done.reason
     assert "(spring on elbow)" in done.reason
     assert ended(campaign(NOTHING, (("x",), ())), None).ended == ""
     assert ended(campaign(), None).ended == ""
@@ -133,7 +133,7 @@ def test_pairs_that_three_rounds_do_not_tell_apart_end_it() -> None:
     stuck = ended(campaign(PAIR, PAIR, PAIR), None)
     assert stuck.ended == "stuck"
     assert "a or b" in stuck.reason
-    other = (("c or d: not told apart yet",), ("c or d",))
+    other = (("c or d: not distinguished yet",), ("c or d",))
     assert ended(campaign(PAIR, PAIR, other), None).ended == ""
     more = ((*PAIR[0], "x"), PAIR[1])
     assert ended(campaign(PAIR, PAIR, more), None).ended == ""

@@ -67,7 +67,7 @@ def test_the_held_out_part_has_the_error_of_the_table(days: Days) -> None:
 def test_a_payload_is_the_reason_of_the_alarm(days: Days) -> None:
     ran = days.program("score", days.fit, days.sound, days.loaded, "-o", "score.h5")
     assert ran.returncode == 1, ran.stderr
-    assert ran.stdout.startswith("2 of 4 runs leave what its own residual allows. loaded: ")
+    assert ran.stdout.startswith("2 of 4 runs exceed the model's tolerance. loaded: ")
     assert "payload that the model does not have at slide, mass 2.0" in ran.stdout
     asked = days.program("score", days.fit, days.sound, days.loaded, "--json")
     assert asked.returncode == 1
@@ -83,8 +83,8 @@ def test_a_payload_is_the_reason_of_the_alarm(days: Days) -> None:
     made = days.program("report", "score.h5", "-o", "score.html")
     assert made.returncode == 0, made.stderr
     page = (days.program.folder / "score.html").read_text(encoding="utf-8")
-    assert "2 of 4 runs leave what its own residual allows" in page
-    assert "RMS of the residual over what the model allows" in page
+    assert "2 of 4 runs exceed the model's tolerance" in page
+    assert "RMS of the residual over the model's tolerance" in page
     found = days.program.answer("compare", "score.h5")
     assert found["days"][0] == "score: sound: motion_1"
     days.program.answer("score", days.fit, days.sound, "-o", "sound_score.h5")
@@ -224,4 +224,4 @@ def test_a_config_without_numbers_is_the_urdf(days: Days) -> None:
     declared.write_text(f"robot: {json.dumps(robot)}\n")
     found = days.program("score", declared, days.sound)
     assert found.returncode == 0, found.stderr
-    assert "does not tell how large its own errors were" in found.stderr.replace("\n", " ")
+    assert "holds no errors of its own data" in found.stderr.replace("\n", " ")

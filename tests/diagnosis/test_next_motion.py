@@ -126,7 +126,7 @@ def test_the_result_belongs_to_the_model_without_rivals(
 def test_without_aliases_it_excites_on_top_of_the_data() -> None:
     planned = plan_after(make_diagnosis([viscous(), SPRING], ()), smoke_spec(), CONFIG.parent)
     assert planned.purpose == "excite"
-    assert "no effect has an alias" in planned.messages[0]
+    assert "no effects are indistinguishable" in planned.messages[0]
     rows = earlier_data([viscous(), SPRING], ()).rows / NOISE * planned.problem.column_scales
     assert np.allclose(planned.prior.factor.T @ planned.prior.factor, rows.T @ rows)
     assert planned.problem.weighting.rows == pytest.approx(np.full(5, 1 / NOISE))
@@ -152,7 +152,7 @@ def test_the_same_torque_in_other_words_is_not_planned_for() -> None:
     twin = EffectRecord("asymmetric_friction", ("elbow",), {}, (1.0, 1.0))
     planned = plan_after(make_diagnosis([COULOMB], (twin,)), smoke_spec(), CONFIG.parent)
     assert planned.purpose == "excite"
-    assert "no alias can be separated" in planned.messages[0]
+    assert "no motion distinguishes the effects" in planned.messages[0]
     assert any("no motion separates them" in message for message in planned.messages)
 
 

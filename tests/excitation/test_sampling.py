@@ -53,7 +53,7 @@ def test_what_is_given_is_kept() -> None:
         (
             "trajectory: {base_frequency: 0.5}\n"
             "sampling: {constraints: {samples: 400, step: 0.02}}",
-            "cover 8 s of a trajectory of 12.5664 s; nothing would hold in the rest",
+            "cover 8 s of a trajectory of 12.5664 s; the constraints would not hold in",
         ),
         ("sampling: {cost: {samples: 100, step: 0.2}}", "last longer than the trajectory"),
         ("trajectory: {base_frequency: 1.0e-4}", "longer than the 3600 s"),

@@ -12,17 +12,17 @@ APART = (LinksApart("base", "arm", 0.5), LinksApart("base – x", "hand, left", 
 TOLD = [
     (Reason(Why.SAME_BODY), "same body"),
     (Reason(Why.IGNORED), "ignored in the config"),
-    (Reason(Why.BY_MESHES), "kept apart by their meshes, as configured"),
+    (Reason(Why.BY_MESHES), "checked by their meshes, as configured"),
     (Reason(Why.ADJACENT), "adjacent"),
     (Reason(Why.OUT_OF_REACH), "out of reach"),
     (Reason(Why.NEVER_NEAR, 0.1234), "never near (at least 0.12 m found)"),
     (Reason(Why.MESHES_NEVER_NEAR, 0.1234), "meshes never near (at least 0.123 m found)"),
     (Reason(Why.ALWAYS_TOUCHING), "always in contact"),
     (Reason(Why.ALWAYS_TOUCHING, 0.0207), "always in contact (up to 0.021 m deep)"),
-    (Reason(Why.ALWAYS_NEAR, 0.004), "always nearer than the margin (at least 0.004 m apart)"),
+    (Reason(Why.ALWAYS_NEAR, 0.004), "always nearer than the margin (distance at least 0.004 m)"),
     (
         Reason(Why.UNGUARDED, 0.05, APART),
-        "unguarded: capsules always overlap (up to 0.050 m deep; meshes apart: base – arm 50%, "
+        "unguarded: capsules always overlap (up to 0.050 m deep; meshes separated: base – arm 50%, "
         "base – x – hand, left 100%)",
     ),
 ]

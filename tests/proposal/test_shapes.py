@@ -52,8 +52,8 @@ def test_a_package_that_is_nowhere_costs_its_links_only(tmp_path: Path) -> None:
     assert {"base – lower"} == {label for c in problem.constraints[-1:] for label in c.labels}
     words = pairs_in_words(problem)
     assert "NOT GUARDED: the meshes of palm, finger are missing" in words[0]
-    assert "speak of" in words[1]
-    assert "all of those that have shapes" in words[1]
+    assert "checked." in words[1]
+    assert "with collision shapes" in words[1]
     assert pairs_data(problem)["links_without_shapes"] == ["palm", "finger"]
     assert not_guarded(problem) == ["wrist"]
 

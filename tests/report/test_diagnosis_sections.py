@@ -121,7 +121,7 @@ def test_all_parts_are_there_and_the_page_is_sound(
     structure = Structure(render(page))
     assert [each.anchor for each in page.sections] == [
         "diagnosis-found", "diagnosis-errors", "diagnosis-time", "diagnosis-evidence",
-        "diagnosis-unexplained", "diagnosis-next", "diagnosis-suspects", "diagnosis-data",
+        "diagnosis-unexplained", "diagnosis-next", "diagnosis-candidates", "diagnosis-data",
     ]  # fmt: skip
     for words in (
         "viscous friction",
@@ -146,7 +146,9 @@ def test_evidence_shows_the_law_and_its_figures(sections: dict[str, Section]) ->
     (chart,) = charts_of(sections["diagnosis-evidence"])
     assert chart.title == "Viscous friction: elbow"
     assert "2.00 ± 0.10 N·m·s/rad" in chart.caption
-    assert "cannot tell it from: nonlinear viscous friction on elbow" in chart.caption
+    assert (
+        "Indistinguishable in these data from: nonlinear viscous friction on elbow" in chart.caption
+    )
     assert "99.8%" in chart.alternative or "99.9%" in chart.alternative
     assert drawn(chart).startswith("speed [rad/s]")
 
@@ -154,8 +156,8 @@ def test_evidence_shows_the_law_and_its_figures(sections: dict[str, Section]) ->
 @pytest.mark.parametrize(
     ("beside", "told"),
     [
-        ((), "cannot tell it from: armature on elbow."),
-        (("spring",), "cannot tell it with spring at the joint on elbow from: "),
+        ((), "In these data it is indistinguishable from: armature on elbow."),
+        (("spring",), "it with spring at the joint on elbow is indistinguishable from: "),
     ],
 )
 def test_evidence_tells_of_pairs(diagnosis: Diagnosis, beside: tuple[str, ...], told: str) -> None:
@@ -182,8 +184,8 @@ def test_evidence_tells_of_another_name_of_the_same_torque(
     section = effect_section(found)
     assert section is not None
     told = charts_of(section)[0].caption
-    assert f"It with {title_of('torque_offset')} on elbow is the same torque as" in told
-    assert "no motion tells them apart" in told
+    assert f"It with {title_of('torque_offset')} on elbow produces the same torque as" in told
+    assert "no motion distinguishes them" in told
 
 
 def test_residuals_tell_held_out_from_training(sections: dict[str, Section]) -> None:
@@ -216,7 +218,7 @@ def test_held_out_blocks_of_a_run_are_shaded(diagnosis: Diagnosis) -> None:
 def test_what_depends_is_told_drawn_and_mapped(sections: dict[str, Section]) -> None:
     section = sections["diagnosis-unexplained"]
     told = [b.text for b in section.blocks if isinstance(b, Text)]
-    assert any("60% of its energy can be predicted, best from history of angle" in x for x in told)
+    assert any("60% of its energy is predictable, best from history of angle" in x for x in told)
     picture, table = charts_of(section)
     assert "mean forwards" in drawn(picture)
     assert ">30<" in drawn(table).replace("\n", "")
@@ -255,9 +257,9 @@ def test_verdicts_on_held_out_data_stand_in_the_table_and_on_the_card(
     diagnosis: Diagnosis, sections: dict[str, Section]
 ) -> None:
     table = next(b for b in sections["diagnosis-found"].blocks if isinstance(b, Table))
-    assert table.rows[0][table.columns.index("held_out")] == "confirmed -6.00 pp"
+    assert table.rows[0][table.columns.index("held-out error")] == "confirmed, 6.00 pp lower"
     (chart,) = charts_of(sections["diagnosis-evidence"])
-    assert "On held-out data: confirmed -6.00 pp." in chart.caption
+    assert "Held-out error: confirmed, 6.00 pp lower." in chart.caption
     assert found_section(diagnosis).lead.count("which took no part, goes from") == 1
 
 
@@ -273,13 +275,13 @@ def test_what_was_weighed_and_what_would_settle_the_absorbed_is_told(diagnosis: 
             block.note
             for block in each.blocks
             if isinstance(block, Table)
-            if "Not test" in block.title
+            if "Not identifiable" in block.title
         ]
         for each in (free, told)
     ]
     assert ["identification.total_mass" in note for (note,) in notes] == [True, False]
     texts = [block.text for block in told.blocks if isinstance(block, Text)]
-    assert any("held-out data are no test of it" in text for text in texts)
+    assert any("held-out data cannot test this effect" in text for text in texts)
 
 
 def test_warnings_are_counted_on_top(diagnosis: Diagnosis) -> None:
@@ -303,7 +305,7 @@ def test_every_run_is_listed_with_its_use_and_what_is_there_alone(diagnosis: Dia
     assert runs.rows == (
         ("a", "training", "–"),
         ("b", "training", "viscous friction of elbow"),
-        ("c", "held_out", "–"),
+        ("c", "held-out", "–"),
     )
     parts = {**diagnosis.processing, "runs": ["a", "b/1"]}
     (runs,) = (

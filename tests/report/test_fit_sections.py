@@ -47,7 +47,7 @@ def test_the_page_is_sound_and_says_what_matters(stored: StoredFit) -> None:
     assert stored.closed_loop_bias[1:] in text
     for name in stored.fit.names:
         assert name in text
-    assert "2.0 times the noise that repeated periods show" in text
+    assert "2.0 times the noise of repeated periods" in text
 
 
 def test_parameters_are_told_by_form(stored: StoredFit) -> None:
@@ -58,9 +58,9 @@ def test_parameters_are_told_by_form(stored: StoredFit) -> None:
     charts = parameter_charts(fit)
     assert {chart.title.split("[")[1].split("]")[0] for chart in charts} == set(fit.units)
     told = " ".join(chart.alternative for chart in charts)
-    assert f"not fixed by the data: {fit.names[1]}" in told
+    assert f"not identifiable: {fit.names[1]}" in told
     words = "".join(chart.svg for chart in charts)
-    for form in ("fixed", "fixed, small", "not fixed"):
+    for form in ("identifiable", "identifiable, not significant", "not identifiable"):
         assert f">{form}<" in words.replace("\n", "")
 
 

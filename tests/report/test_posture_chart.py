@@ -42,7 +42,7 @@ def test_the_nearest_two_are_those_of_coal(case: Case, svg: str) -> None:
     length = np.hypot(float(line[2]) - float(line[0]), float(line[3]) - float(line[1]))
     assert length <= distances.min() * scale + 0.2
     chart = posture_chart(Campaign("smoke", result, problem))
-    assert f"{in_figures(1e3 * distances.min())} mm apart" in chart.caption
+    assert f"distance {in_figures(1e3 * distances.min())} mm" in chart.caption
     assert kept.capsules[first].name in chart.alternative
 
 

@@ -123,7 +123,7 @@ def test_what_nobody_can_follow_is_told(tmp_path: Path) -> None:
     robot = claw(tmp_path, '<mimic joint="knuckle" multiplier="-1.0"', '<mimic joint="knuckl"')
     assert {"left_tip", "right_knuckle", "right_tip"} == set(robot.locked)
     assert robot.description.notes[0] == (
-        "'left_tip' mimics 'knuckl', which is no joint of the URDF: it stays where it is. Did you "
+        "'left_tip' mimics 'knuckl', which is no joint of the URDF: the joint is locked. Did you "
         "mean 'knuckle'?"
     )
     with pytest.raises(RobotError, match=r"in a circle \(.*left_inner_joint → left_inner_joint\)"):

@@ -61,7 +61,7 @@ APPROXIMATIONS = [
     ),
     (
         Approximation(kind="armature"),
-        "something that also looks like inertia of the motor (armature)",
+        "an effect of similar shape to inertia of the motor (armature)",
     ),
 ]
 

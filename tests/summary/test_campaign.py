@@ -22,7 +22,7 @@ def test_the_reason_comes_first_and_seconds_add_up() -> None:
         "efficiency": "",
         "before": "10.00%",
         "after": "2.00%",
-        "torques known to": "0.3",
+        "torque std [σ]": "0.3",
         "effects": "spring on elbow",
     }
     assert "1 rounds, 1 motions, 12 s of motion" in str(answer.parts[2])
@@ -40,7 +40,7 @@ def test_a_round_in_words() -> None:
     learned = WHOLE.rounds[0].learned
     assert learned is not None
     assert round_in_words(1, learned) == (
-        "round 1: 10.00% → 2.00% of the torque is missed on the newest motion, with spring on "
+        "round 1: held-out error 10.00% → 2.00% of the torque on the newest motion, with spring on "
         "elbow; open: a or b"
     )
     assert round_in_words(2, replace(learned, effects=(), open=())).endswith(

@@ -45,10 +45,10 @@ def test_an_approximation_is_no_name_for_scripts(doubted: Diagnosis) -> None:
 
 def test_an_approximation_has_a_table_of_its_own(doubted: Diagnosis) -> None:
     text = printed(doubted)
-    assert "Approximations: they come near something else that is there" in text
+    assert "Surrogate terms (true form unknown)" in text
     assert REASON in text
     assert "What the declared model lacks" not in text
-    assert "0 effects, 1 approximation" in text
+    assert "0 effects, 1 surrogate term" in text
 
 
 def test_approximations_that_are_not_confirmed_are_one_line(doubted: Diagnosis) -> None:
@@ -61,7 +61,7 @@ def test_approximations_that_are_not_confirmed_are_one_line(doubted: Diagnosis) 
     told = printed(replace(found, effects=(harmful, *found.effects[1:])))
     assert "viscous_friction on elbow (harmful) (--verbose" in told
     tables = [p for p in diagnosis_answer(found, "", {}, True).parts if isinstance(p, Table)]
-    assert any(table.title.startswith("Approximations") for table in tables)
+    assert any(table.title.startswith("Surrogate terms") for table in tables)
 
 
 def printed(found: Diagnosis) -> str:
@@ -80,7 +80,7 @@ def test_other_names_of_the_same_torque_are_told() -> None:
     (named, *others) = found.effects
     effect = replace(named.effect, kind="asymmetric_friction")
     text = printed(replace(found, effects=(replace(named, effect=effect), *others)))
-    assert "is the same torque as coulomb_friction and torque_offset" in text
+    assert "produces the same torque as coulomb_friction and torque_offset" in text
     assert "the same torque" not in printed(found)
 
 
@@ -90,7 +90,7 @@ def test_the_noise_floor_stands_beside_the_errors(doubted: Diagnosis) -> None:
     found = replace(doubted, noise_floor=floor)
     text = printed(found)
     assert "noise floor" in text
-    assert "1.2 times the noise that repeated periods show (elbow 4.0 times)" in text
+    assert "1.2 times the noise of repeated periods (elbow 4.0 times)" in text
     rows = text.partition("Error of the torque")[2].splitlines()
     unknown = next(line for line in rows if line.startswith(doubted.joint_names[-1]))
     assert unknown.split()[-1] == "-"
@@ -104,7 +104,7 @@ def test_without_repeated_periods_nothing_is_said_of_noise(doubted: Diagnosis) -
 def test_pairs_that_cannot_be_told_from_one_effect() -> None:
     one, other, pair = (EffectRecord(kind, ("elbow",)) for kind in ("spring", "armature", "ripple"))
     found = replace(make_diagnosis(), joint_aliases=(JointAlias((one,), (other, pair)),))
-    told = "spring on elbow cannot be told from: armature on elbow with ripple on elbow"
+    told = "spring on elbow is indistinguishable from: armature on elbow with ripple on elbow"
     assert told in " ".join(printed(found).split())
     data = diagnosis_answer(found, "arm.yaml", {}).data["joint_aliases"]
     assert data == [
@@ -121,7 +121,10 @@ def test_another_name_of_the_same_torque_is_told_as_such() -> None:
     other = EffectRecord("asymmetric_friction", ("elbow",))
     alias = JointAlias(tuple(parts), (other,))
     found = replace(make_diagnosis(), joint_aliases=(alias,))
-    told = "on elbow is the same torque as asymmetric_friction on elbow: no motion tells them apart"
+    told = (
+        "on elbow produces the same torque as asymmetric_friction on elbow: no motion "
+        "distinguishes them"
+    )
     assert told in " ".join(printed(found).split())
     (data,) = diagnosis_answer(found, "arm.yaml", {}).data["joint_aliases"]
     assert data["same_torque"]
@@ -140,8 +143,8 @@ def test_nothing_is_missing_only_where_nothing_large_is_left(doubted: Diagnosis)
         assert "elbow" in text
     assert "q[elbow] and load[elbow]" in printed(replace(bare, large_rests=(rest,)))
     alone = replace(rest, depends_on=(), predictable=0.0, certain=False, noise=None)
-    assert "the noise is not known" in printed(replace(bare, large_rests=(alone,)))
-    assert "memory could be as large" in printed(
+    assert "the noise level is unknown" in printed(replace(bare, large_rests=(alone,)))
+    assert "coloured noise could be as large" in printed(
         replace(bare, large_rests=(replace(alone, noise=0.1),))
     )
     assert diagnosis_answer(doubted, "arm.yaml", {}).data["noise_floor"] is None
@@ -183,7 +186,9 @@ def test_a_held_out_error_that_did_not_fall_is_told_first(bad: Diagnosis) -> Non
 
 def test_without_a_harmful_effect_those_not_confirmed_are_told(bad: Diagnosis) -> None:
     (first, *_) = diagnosis_answer(replace(bad, effects=bad.effects[1:2]), "arm.yaml", {}).parts
-    assert "None is harmful beyond doubt; not confirmed: viscous_friction on elbow." in str(first)
+    assert "No effect is significantly harmful; not confirmed: viscous_friction on elbow." in str(
+        first
+    )
 
 
 @pytest.mark.parametrize("change", [{"effects": ()}, {"after": None}])
@@ -203,18 +208,18 @@ def test_every_effect_shows_what_it_is_worth_on_held_out_data(
 ) -> None:
     """In percentage points where it is most; a harmful effect is never too small to be shown."""
     text = printed(bad)
-    assert "- harmful +40.00 pp\n" in text
-    assert "small ones" not in text  # of an error that did not fall, nothing is
+    assert "- harmful, 40.00 pp higher\n" in text
+    assert "small effects" not in text  # of an error that did not fall, nothing is
     tiny = dict.fromkeys(bad.joint_names, 1e-4)
     folded = [*bad.effects[:1], *(replace(each, parts=tiny) for each in bad.effects[1:])]
     fell = replace(bad, before=replace(bad.before, mean_relative_moving=0.5), effects=tuple(folded))
     text = printed(replace(fell, after=replace(fell.after, mean_relative_moving=0.1)))
-    assert "2 small ones (each below 1% of the fall)" in text
+    assert "2 small effects (each below 1% of the error reduction)" in text
     assert "viscous_friction on elbow (not confirmed)" in text
-    assert "- harmful +40.00 pp\n" in text  # whatever it takes off
+    assert "- harmful, 40.00 pp higher\n" in text  # whatever it takes off
     elsewhere = replace(bad.effects[0], removes={"slide": Removed(0.01, 0.02, 0.1)})
-    assert "harmful -2.00 pp on slide\n" in printed(replace(bad, effects=(elsewhere,)))
-    assert "confirmed -6.00 pp a function of v[elbow]" in printed(doubted)
+    assert "harmful, 2.00 pp lower on slide\n" in printed(replace(bad, effects=(elsewhere,)))
+    assert "confirmed, 6.00 pp lower a function of v[elbow]" in printed(doubted)
     older = replace(bad.effects[0], verdict=None, removes={})
     assert " pp" not in printed(replace(bad, effects=(older,)))
 
@@ -293,21 +298,23 @@ def test_what_rests_on_a_weight_is_told_so_and_never_small(weighed: Diagnosis) -
     small = replace(gain, verdict=HeldOutVerdict.CONFIRMED)
     begin = replace(weighed.before, mean_relative=0.5, mean_relative_moving=0.5)
     text = printed(replace(weighed, effects=(gain, small, small), before=begin))
-    assert "2 small ones" in text
-    assert "- rests on what was weighed" not in text.split("small ones")[1]
+    assert "2 small effects" in text
+    assert "- based on the known mass" not in text.split("small effects")[1]
     assert (
-        "torque_gain on elbow rests on what was weighed (identification.total_mass, "
-        "identification.known_payload): other inertias would predict as well without it"
+        "torque_gain on elbow is based on the known mass (identification.total_mass, "
+        "identification.known_payload): other inertias would predict as well without torque_gain"
     ) in text
-    assert text.count("held-out data are no test of it") == 1
+    assert text.count("held-out data cannot test this effect") == 1
 
 
 def test_what_inertias_take_up_is_told_with_what_settles_it(weighed: Diagnosis) -> None:
     kinds = ("torque_gain", "armature", "torque_gain", "wrench_gain", "kind_of_a_package")
     absorbed = tuple(Absorbed(kind, ("elbow",), ("Izz[elbow]",), 0.0) for kind in kinds)
     text = printed(replace(weighed, effects=(), absorbed=absorbed))
-    told = [line for line in text.splitlines() if " is told by " in line]
+    told = [line for line in text.splitlines() if " is identifiable with " in line]
     assert [line.split()[0] for line in told] == ["torque_gain", "wrench_gain"]
     assert "identification.known_payload" in told[0]
     assert "identification.total_mass" in told[1]
-    assert " is told by " not in printed(replace(weighed, absorbed=absorbed))  # weighed already
+    assert " is identifiable with " not in printed(
+        replace(weighed, absorbed=absorbed)
+    )  # weighed already

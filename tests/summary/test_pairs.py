@@ -25,9 +25,7 @@ def test_all_pairs_are_kept_apart() -> None:
     problem = load_problem(SMOKE)
     assert kept_apart(problem) == 7
     assert unjudged(problem) == []
-    assert pairs_in_words(problem) == [
-        "Verdicts speak of 7 of 7 pairs of bodies, all that could come near each other."
-    ]
+    assert pairs_in_words(problem) == ["Self-collision: all 7 relevant link pairs checked."]
 
 
 def test_pairs_that_are_ignored_are_counted_and_named() -> None:
@@ -37,7 +35,7 @@ def test_pairs_that_are_ignored_are_counted_and_named() -> None:
     assert {pair.reason.why for pair in left} == {Why.IGNORED}
     told = pairs_in_words(problem)[0]
     total = kept_apart(problem) + len(left)
-    assert f"{kept_apart(problem)} of {total} pairs" in told
+    assert f"{kept_apart(problem)} of {total} relevant link pairs" in told
     assert "base – wrist: ignored in the config" in told
     data = pairs_data(problem)
     assert data["kept_apart"] == kept_apart(problem) < 7
@@ -90,7 +88,7 @@ def test_links_without_shapes_are_told(tmp_path: Path) -> None:
     assert not_guarded(problem) == ["elbow"]
     told = pairs_in_words(problem)
     assert "NOT GUARDED: what moves with elbow (forearm" in told[0]
-    assert "speak of" in told[1]
+    assert "checked." in told[1]
     assert pairs_data(problem)["not_guarded"] == ["elbow"]
     assert pairs_data(load_problem(SMOKE))["not_guarded"] == []
 
@@ -109,10 +107,7 @@ def test_two_arms_with_shapes_on_their_last_links_only(tmp_path: Path) -> None:
     assert kept_apart(bare) == 1
     told = pairs_in_words(bare)
     assert "NOT GUARDED: what moves with left_1 (left_link_1), left_2" in told[0]
-    assert told[1] == (
-        "Verdicts speak of 1 of 1 pairs of bodies, all of those that have shapes that could come "
-        "near each other."
-    )
+    assert told[1] == ("Self-collision: 1 of 1 relevant link pairs with collision shapes checked.")
     shown = load_problem(config, ["constraints.self_collision.shapes=visual"])
     assert not_guarded(shown) == []
     assert kept_apart(shown) > 30

@@ -101,7 +101,7 @@ def records(problem: Problem, result: Result) -> dict[str, Shown]:
         "The gradient is right.": verify_gradient(problem),
         "smoke_arm.urdf; constraints, optimizer, sampling": problem.spec,
         "viscous of elbow rose from 1 to 2.00 ± 0.10 N·m·s/rad since may": CHANGE,
-        "monday: 2.00% of the torque; 3 times what is allowed on elbow": SCORED,
+        "monday: 2.00% of the torque; 3 times the tolerance on elbow": SCORED,
         "2 joints, 0.5 false alarms an hour": THRESHOLDS,
     }
 

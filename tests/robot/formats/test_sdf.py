@@ -92,7 +92,7 @@ def test_what_a_urdf_cannot_hold_is_told(tmp_path: Path) -> None:
     told = " | ".join(found.notes)
     for part in (
         "a closed loop is cut between c and a",
-        "ball stays where it is, of type ball",
+        "ball is locked: joints of type ball are not supported",
         "joined to nothing, left out: loose",
         "not part of the robot, left out: table",
         "the spring of j1 has no place in a URDF",
