@@ -24,7 +24,7 @@ from excite_cli.identification.torque_scale import KNOWN_LOAD
 FRICTION = "friction"
 INERTIAS = "inertias"
 _WORTH_SAYING = 0.05  # share of the fall
-_ALL = 0.995
+_NEARLY_ALL = 0.995
 _MOST = 3  # effects beside friction that get a clause of their own
 _PREFIXES = ((1e6, "M"), (1e3, "k"))
 
@@ -74,7 +74,7 @@ def _missing(found: Diagnosis) -> str:
     said = []
     friction = of_all.get(FRICTION, 0.0)
     if friction >= _WORTH_SAYING:
-        share = "all" if friction > _ALL else f"{friction:.0%}"
+        share = "nearly all" if friction > _NEARLY_ALL else f"{friction:.0%}"
         rubbing = [each for each in found.effects if _rubs(each)]
         which, most = _friction(rubbing, found), _most_friction(rubbing, found)
         said.append(f"{which} accounts for {share} of the unmodelled torque{most}.")
