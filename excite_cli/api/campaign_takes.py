@@ -147,8 +147,8 @@ class Takes:
         """
         if (same := same_file(log, used)) is not None:
             return (
-                f"{log.name} is no log of {motion.stem}: it is a copy of {same.name}, byte for "
-                "byte, which is the log of another motion."
+                f"{log.name} is no log of {motion.stem}: {log.name} is a copy of {same.name}, "
+                "byte for byte, the log of another motion."
             )
         try:
             data = load_data(self.case, log, _silent)
@@ -161,7 +161,7 @@ class Takes:
             if since is not None and run.epoch is not None and run.epoch + run.t[-1] < since:
                 return (
                     f"its time stamps end {since - run.epoch - run.t[-1]:.0f} s before the motion "
-                    "was laid out: an older recording is none of it."
+                    "was written: the file is an older recording."
                 )
             found = compared(planned, (run.t, run.q[:, own]), data.joint_names[own])
             if found.reason:

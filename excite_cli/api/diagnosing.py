@@ -33,7 +33,7 @@ from excite_cli.workers.at_hand import at_hand
 from excite_cli.workers.base import Workers
 
 _HAVE_IT = (
-    "What was found does not lower the error on held-out data. To have it in a config all the "
+    "The effects found do not lower the error on held-out data. To have it in a config all the "
     "same: --apply-unconfirmed (in Python apply_unconfirmed=True of diagnose, unconfirmed=True of "
     "save_config)."
 )

@@ -30,8 +30,8 @@ def left_on_newest(found: Diagnosis) -> list[str]:
         size = held_out.rms_moving.get(joint, 0.0) / max(trained.rms_moving.get(joint, 0.0), 1e-300)
         if min(share, size) > _AS_GOOD:
             said.append(
-                f"{joint}: {left:.2%} of its torque is missed on {found.held_out_run}, "
-                f"{share:.1f} times as much as on the motions before"
+                f"{joint}: residual {left:.2%} of its torque on {found.held_out_run}, "
+                f"{share:.1f} times that of the earlier motions"
             )
     return said
 

@@ -44,7 +44,7 @@ def score(
     """Play a stored model on new data: does it still predict the torque, and if not, why?
 
     Nothing is fitted. Every run has its error per joint beside that of the day the model was made,
-    and an alarm where its residual is beyond what the model's own allows, with the likely reason: a
+    and an alarm where its residual exceeds the model's tolerance, with the likely reason: a
     payload, a contact, an offset, other friction, an encoder that slipped. Files are read one after
     the other, so there may be hundreds.
 

@@ -317,9 +317,8 @@ def _cut_short(over: bool, spec: Spec, seconds: float) -> tuple[Finding, ...]:
     if not over or not spec.diagnosis.rounds:
         return ()
     text = (
-        f"the search was ended after {seconds:.0f} s, with the answer so far: what else is missing "
-        "was not looked for. Without diagnosis.max_seconds, and without Ctrl-C, it goes on to its "
-        "end"
+        f"the search ended after {seconds:.0f} s with the answer so far, so further effects may be "
+        "missing. Without diagnosis.max_seconds and without Ctrl-C, the search runs to its end"
     )
     return (Finding(CUT_SHORT, "warning", text),)
 

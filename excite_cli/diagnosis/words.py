@@ -189,8 +189,8 @@ def ends_in_words(part: HeldOutEnds) -> str:
     """The errors on the held-out ends of runs that carry effects of their own."""
     kinds = ", ".join(dict.fromkeys(effect.kind for effect in part.effects))
     return (
-        f"The ends of {', '.join(part.runs)}{f' (with {kinds})' if kinds else ''} took no part, "
-        f"either: mean error there {part.before.mean_relative_moving:.2%} → "
+        f"The ends of {', '.join(part.runs)}{f' (with {kinds})' if kinds else ''} are held out "
+        f"too: mean error there {part.before.mean_relative_moving:.2%} → "
         f"{part.after.mean_relative_moving:.2%} where joints move."
     )
 

@@ -18,7 +18,7 @@ class LoadDependentFriction(Effect):
     """τ_j = μ |load_j| sgn v_j, μ ≥ 0."""
 
     kind: ClassVar = "load_dependent_friction"
-    title: ClassVar = "friction that grows with load"
+    title: ClassVar = "load-dependent friction"
     signature: ClassVar = "the jump at a reversal is the larger the more torque the joint carries"
     function_of: ClassVar = ("speed", "load")
     friction: ClassVar = True

@@ -35,7 +35,7 @@ def figures_of(found: Diagnosis) -> dict[str, Callable[[], "Figure"]]:
              for each in traces if each.before is not None]  # fmt: skip
     for name, title, parts in (
         ("before", "the declared model", alone),
-        ("after", "the model with what was found", traces),
+        ("after", "the model with the effects found", traces),
     ):
         plots = plots_in_time(parts, found.joint_names, units)
         labels = dict(zip(dict.fromkeys(trace.run for trace in parts), plots, strict=True))
@@ -56,7 +56,7 @@ def figures_of(found: Diagnosis) -> dict[str, Callable[[], "Figure"]]:
         large, _ = by_worth(found.effects, found)
         cards = effect_plots(found, found.traces, large)
         for number, part in enumerate(_parts(cards), 1):
-            title = "What everything else leaves, and the law that was found"
+            title = "Partial residuals and the fitted laws"
             figures[f"effects_{number}"] = partial(draw_plots, title, part, 3)
     return figures
 

@@ -70,7 +70,7 @@ def together(clouds: Sequence[Cloud]) -> Cloud:
 def cloud_plot(title: str, cloud: Cloud, caption: str = "") -> Plot:
     """Dots, medians with the middle 80 % of the samples, and the law."""
     words = (
-        f"Torque that everything else leaves, over {cloud.axis}, with the fitted law, which "
+        f"Partial residual torque over {cloud.axis}, with the fitted law, which "
         f"explains {cloud.explained:.1%} of its energy; the law goes from {cloud.law.min():.3g} to "
         f"{cloud.law.max():.3g} {cloud.unit}, samples from {cloud.partial.min():.3g} to "
         f"{cloud.partial.max():.3g} {cloud.unit}."
@@ -173,7 +173,7 @@ def window_plot(
     own, left = trace.own[inside, row], trace.partial[inside, row]
     t = trace.t[inside]
     words = (
-        f"From {t[0]:.2f} to {t[-1]:.2f} s everything else leaves torque from "
+        f"From {t[0]:.2f} to {t[-1]:.2f} s the partial residual torque ranges from "
         f"{np.nanmin(left):.3g} to {np.nanmax(left):.3g} {unit}; the effect predicts from "
         f"{np.nanmin(own):.3g} to {np.nanmax(own):.3g} {unit}."
     )

@@ -36,9 +36,9 @@ def fit_figures(stored: StoredFit) -> tuple[KeyFigure, ...]:
             f"{fit.rank} base parameters, {len(fit.names) - fit.rank} of effects",
         ),
         KeyFigure(
-            "independent samples",
+            "effective sample size",
             f"{fit.samples:.0f}",
-            f"worth of {fit.count}, which are correlated in time",
+            f"of {fit.count} samples, which are correlated in time",
         ),
     )
 
@@ -142,8 +142,8 @@ def time_section(stored: StoredFit) -> Section:
     traces = sorted(stored.traces, key=lambda trace: not trace.held_out)
     blocks = residuals_in_time(traces, stored.fit.joint_names, units)
     lead = (
-        "Filtered torque, as the fit sees it: above what was measured and what the model says, "
-        "below what it leaves. Shaded: held out, took no part in the fit."
+        "Filtered torque, as used in the fit. Above: measured torque and prediction of the model; "
+        "below: residual. Shaded: held out from the fit."
         if traces
         else ""
     )

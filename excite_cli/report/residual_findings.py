@@ -19,7 +19,7 @@ _WORDS = {
     "reasons": "reasons",
     "samples": "samples used",
     "candidates": "candidates tried",
-    "inflation": "χ² of placebos, by which tests are divided",
+    "inflation": "null inflation of χ² (tests are corrected)",
     "runs": "training runs",
     "standstill_share": "samples left out at standstill and reversals",
     "invalid_share": "samples left out as invalid",

@@ -48,9 +48,9 @@ def _in_words(found: LoadIdentification) -> str:
     """Mass and centre, from how much data."""
     mass = found.parameters["mass"]
     centre = ", ".join(with_deviation(1e3 * p.value, 1e3 * p.std) for p in _centre(found))
-    doubt = "" if found.possible else " No body is so."
+    doubt = "" if found.possible else " These values are physically infeasible."
     if any(each.kind == "more_than_a_load" for each in found.findings):
-        doubt += " But these data hold more than a load, and the ± know nothing of that."
+        doubt += " But these data hold more than a payload, which the ± do not cover."
     return (
         f"{found.link} carries {with_deviation(mass.value, mass.std)} kg with its centre at "
         f"({centre}) mm, from {found.seconds:.3g} s of motion.{doubt}"

@@ -94,7 +94,8 @@ def test_names_that_fit_as_well_are_to_be_told_apart_next(plain: Diagnosis) -> N
 def test_one_effect_is_told_by_its_name(plain: Diagnosis) -> None:
     answer = found(plain, effect("load_dependent_friction", "elbow", RUBS, everywhere(plain, 0.4)))
     assert answer_in_words(answer).startswith(
-        "Friction that grows with load of elbow (2 N·m) accounts for nearly all of the unmodelled torque. "
+        "Load-dependent friction of elbow (2 N·m) accounts for nearly all of the "
+        "unmodelled torque. "
     )
 
 

@@ -38,7 +38,7 @@ def charts(plain: Diagnosis, kinds: Sequence[str], quantity: str = "speed") -> l
 @pytest.mark.parametrize("kind", ["contact", "torque_offset", "payload", "of_another_installation"])
 def test_a_touch_is_shown_while_it_lasts_all_else_as_samples(plain: Diagnosis, kind: str) -> None:
     (chart,) = charts(plain, [kind])
-    assert ("s everything else leaves torque" in chart.alternative) == (kind == "contact")
+    assert ("s the partial residual torque ranges" in chart.alternative) == (kind == "contact")
 
 
 def test_any_kind_may_ask_for_the_seconds_in_which_it_shows(
@@ -46,7 +46,7 @@ def test_any_kind_may_ask_for_the_seconds_in_which_it_shows(
 ) -> None:
     monkeypatch.setattr(catalogue()["spring"], "picture", "window")
     (chart,) = charts(plain, ["spring"])
-    assert "s everything else leaves torque" in chart.alternative
+    assert "s the partial residual torque ranges" in chart.alternative
 
 
 @pytest.mark.parametrize("quantity", ["speed", "velocity"])
