@@ -21,7 +21,7 @@ def inspect(
         typer.Option(
             "--apply",
             metavar="NEW.yaml",
-            help="Write the config with the settings that resolve faults and doubts.",
+            help="Write the config with what resolves faults and doubts, its comments kept.",
             rich_help_panel=OUTPUT,
         ),
     ] = None,

@@ -83,8 +83,8 @@ def test_a_payload_is_the_reason_of_the_alarm(days: Days) -> None:
     made = days.program("report", "score.h5", "-o", "score.html")
     assert made.returncode == 0, made.stderr
     page = (days.program.folder / "score.html").read_text(encoding="utf-8")
-    assert "2 of 4 runs exceed the model's tolerance" in page
-    assert "RMS of the residual over the model's tolerance" in page
+    assert "2 of 4 runs exceed the model&#39;s tolerance" in page
+    assert "RMS of the residual over the model&#39;s tolerance" in page
     found = days.program.answer("compare", "score.h5")
     assert found["days"][0] == "score: sound: motion_1"
     days.program.answer("score", days.fit, days.sound, "-o", "sound_score.h5")

@@ -48,7 +48,7 @@ def test_the_table_takes_the_place_of_the_capsules(wrist: Robot) -> None:
     ("pair", "words"),
     [
         (["plate", "far"], "3 moved joints are between them"),
-        (["plate", "cross"], "a joint joins them"),
+        (["plate", "cross"], "a joint connects both links"),
         (["plate", "baar"], "Did you mean 'bar'"),
     ],
 )
