@@ -198,7 +198,7 @@ def _next(found: Diagnosis) -> str:
         names += f" of {place_in_words(other, len(found.joint_names))}"
     if not by_motion:
         return (
-            f"Next: record a run with a known payload ({KNOWN_LOAD}) to distinguish {names}; no "
+            f"Next: record a run with a known load ({KNOWN_LOAD}) to distinguish {names}; no "
             "motion distinguishes them."
         )
     return f"Next: plan a motion that distinguishes {names} (excite optimize … --after)."
