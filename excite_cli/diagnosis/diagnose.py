@@ -86,8 +86,8 @@ Progress = Callable[[str, int], None]
 _OPEN = Finding(
     "open_setup",
     "warning",
-    "The set-up is in doubt (above): until the config resolves the doubt, only friction, offsets "
-    "and armature can be confirmed. `excite inspect` lists the config keys",
+    "The set-up is in doubt (above): until the config resolves the doubt, only friction, "
+    "offsets and motor inertia can be confirmed. `excite inspect` lists the config keys",
 )
 
 

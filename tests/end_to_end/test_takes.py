@@ -153,7 +153,7 @@ def test_an_inbox_takes_whole_logs_of_its_motion_and_of_today(
     with h5py.File(first, "a") as file:
         for run in file["runs"].values():
             run.attrs["epoch"] = time.time() - 30 * 86400.0
-    hear("its time stamps end ", "s before the motion was laid out", "touch ", ".ok")
+    hear("its time stamps end ", "s before the motion was written", "touch ", ".ok")
     shutil.copy(good, first)
     hear("play ", "round_1_motion_2.csv")
     second = box / "round_1_motion_2_log.h5"
