@@ -195,7 +195,7 @@ def report(name: str, case: Case, folder: Path) -> bool:
     print(f"{name}: {case.config}, truth {case.truth}")
     for effect in outcome.first:
         aliases = ", ".join(_short(alias) for alias in effect["alias_set"]) or "none"
-        print(f"  first diagnosis: {_short(effect)}; cannot be told from: {aliases}")
+        print(f"  first diagnosis: {_short(effect)}; indistinguishable from: {aliases}")
     for pair in outcome.pairs:
         kinds = tuple(pair[side].split(" on ")[0] for side in ("effect", "alias"))
         text = "neither is the truth"
@@ -209,7 +209,7 @@ def report(name: str, case: Case, folder: Path) -> bool:
     for effect in outcome.last:
         aliases = ", ".join(_short(alias) for alias in effect["alias_set"]) or "none"
         values = ", ".join(f"{k} {v['value']:.4g}" for k, v in effect["parameters"].items())
-        print(f"  in the end: {_short(effect)} ({values}); cannot be told from: {aliases}")
+        print(f"  in the end: {_short(effect)} ({values}); indistinguishable from: {aliases}")
     good = outcome.settled(case)
     spent = ", ".join(f"{step} {value:.0f}" for step, value in outcome.seconds.items())
     verdict = "from an alias set to the right name alone" if good else "NOT SETTLED"

@@ -43,13 +43,13 @@ class LoadProblem(Shown):
         """What the motion will tell."""
         e, seconds = self.expected, self.problem.trajectory.duration
         words = (
-            f"{seconds:.3g} s will tell a load of {e.mass:g} kg to ± {1e3 * e.mass_std:.2g} g and "
-            f"its centre to ± {1e3 * e.center_std:.2g} mm (one standard deviation, with the noise "
-            "and the deviations of the fit)"
+            f"{seconds:.3g} s will identify a load of {e.mass:g} kg to ± {1e3 * e.mass_std:.2g} g "
+            f"and its centre to ± {1e3 * e.center_std:.2g} mm (one standard deviation, with the "
+            "noise and the deviations of the fit)"
         )
         if self.enough:
             return words
-        return f"{words}: no duration up to {seconds:.3g} s tells it to 0.4 % and 1.2 mm"
+        return f"{words}: no duration up to {seconds:.3g} s reaches 0.4 % and 1.2 mm"
 
 
 show(

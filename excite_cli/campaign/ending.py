@@ -38,7 +38,7 @@ def left_on_newest(found: Diagnosis) -> list[str]:
 
 def still_open(found: Diagnosis, pairs: tuple[str, ...]) -> tuple[str, ...]:
     """What still matters, in sentences; `pairs`: effects that a motion could tell apart."""
-    said = [f"{pair}: not told apart yet" for pair in pairs]
+    said = [f"{pair}: not distinguished yet" for pair in pairs]
     said += [f"{joint}: more than noise is left of its torque" for joint in found.joints_left]
     said += left_on_newest(found)
     said += [
@@ -101,7 +101,7 @@ def _in_vain(campaign: Campaign) -> Campaign:
     if not pairs or any(len(each.open) > len(each.pairs) for each in learned):
         return campaign
     text = (
-        f"Not finished: {_IN_VAIN} rounds did not tell apart {'; '.join(sorted(pairs))}. Nothing "
+        f"Not finished: {_IN_VAIN} rounds did not distinguish {'; '.join(sorted(pairs))}. Nothing "
         "else is open."
     )
     return replace(campaign, ended="stuck", reason=text)

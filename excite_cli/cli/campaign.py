@@ -87,7 +87,7 @@ def campaign(
         typer.Option(
             "--plain",
             rich_help_panel=_BUDGET,
-            help="No motions that look for what nobody has found: the model's own alone.",
+            help="No exploration motions: only those that excite the model's own effects.",
         ),
     ] = False,
     effect: Annotated[

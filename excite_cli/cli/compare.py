@@ -44,7 +44,7 @@ def compare(
     verbose: options.Verbose = False,
     no_progress: options.NoProgress = False,
 ) -> None:
-    """Tell which parameters and effects changed between days, each with its test.
+    """Report which parameters and effects changed between days, each with its test.
 
     Every parameter is followed over the files: is there a day since which it is another? What
     temperature or another column of the log explains is taken out first, where there are days

@@ -43,7 +43,7 @@ def optimize(
     ] = None,
     purpose: Annotated[
         Purpose | None,
-        typer.Option("--for", help="payload: the shortest motion that tells a load, on --fit."),
+        typer.Option("--for", help="payload: shortest motion that identifies one, given --fit."),
     ] = None,
     fit: Annotated[
         Path | None,
@@ -61,7 +61,7 @@ def optimize(
     ] = None,
     efficiency: Annotated[
         bool,
-        typer.Option("--efficiency", help="Also the share of what free states could tell."),
+        typer.Option("--efficiency", help="Information efficiency relative to free states, too."),
     ] = False,
     seed: options.Seed = None,
     overrides: options.Set = None,
@@ -77,18 +77,19 @@ def optimize(
 ) -> None:
     """Find motions that make the inertial parameters, and effects that are listed, visible.
 
-    Every stored motion keeps all constraints. With --after, the motion tells apart the effects that
-    the diagnosis could not; if there are none, it excites the model with all effects found, on top
-    of the measured data. Exit status 1: no admissible motion exists or was found, and the message
-    names the constraint that prevents it.
+    Every stored motion keeps all constraints. With --after, the motion distinguishes the effects
+    that the diagnosis could not; if there are none, it excites the model with all effects found, on
+    top of the measured data. Exit status 1: no admissible motion exists or was found, and the
+    message names the constraint that prevents it.
 
-    With --for payload the motion is the shortest that tells mass, centre and inertia of what the
-    robot carries, beside a fit of the robot alone; its config is written beside the result (.yaml).
+    With --for payload the motion is the shortest that identifies mass, centre and inertia of what
+    the robot carries, given a fit of the robot alone; its config is written beside the result
+    (.yaml).
 
     Ctrl-C stores the best motion so far, proved as well; --resume makes that one anew.
 
-    With --starts each motion is the best of many starts, told apart early, which --workers
-    processes or a dask cluster share; the result is the same to the last digit whoever does them.
+    With --starts each motion is the best of many starts (successive halving), which --workers
+    processes or a dask cluster share; the result is the same to the last digit.
 
     Examples:
       excite optimize ur10.yaml -o ur10.h5

@@ -74,13 +74,13 @@ def _missing(found: Diagnosis) -> str:
     said = []
     friction = of_all.get(FRICTION, 0.0)
     if friction >= _WORTH_SAYING:
-        what = "nearly all" if friction > _NEARLY_ALL else f"{friction:.0%} of what"
+        what = "nearly all of" if friction > _NEARLY_ALL else f"{friction:.0%} of"
         rubbing = [each for each in found.effects if _rubs(each)]
         which, most = _friction(rubbing, found), _most_friction(rubbing, found)
-        said.append(f"{which} is {what} your model misses{most}.")
+        said.append(f"{which} accounts for {what} the unmodelled torque{most}.")
     said += [
-        f"On {_place(each, found)}: {title_of(each.effect.kind)} ({_first(each)}), by what was "
-        "weighed."
+        f"On {_place(each, found)}: {title_of(each.effect.kind)} ({_first(each)}), given the "
+        "known mass."
         for each in found.named
         if _weighed(each)
     ]
@@ -89,20 +89,20 @@ def _missing(found: Diagnosis) -> str:
     fall = found.fall if found.fall > 0.0 else inf
     worth = [each for each in others if each.takes_off >= _WORTH_SAYING * fall]
     for each in sorted(worth, key=lambda each: -each.takes_off)[:_MOST]:
-        share = f"{each.takes_off / fall:.0%} of what it misses"
+        share = f"{each.takes_off / fall:.0%} of the unmodelled torque"
         what = f"{title_of(each.effect.kind)} ({_first(each)}, {share})"
         said.append(f"On {_place(each, found)}: {what}.")
     if not said:
         said.append(
-            f"Your model misses {counted(len(found.effects), 'effect')}, none of them large."
+            f"Your model lacks {counted(len(found.effects), 'effect')}, none of them large."
         )
     elif of_all.get(INERTIAS, 0.0) >= _WORTH_SAYING:
-        said.append(f"Inertias off the URDF's are {of_all[INERTIAS]:.0%}.")
+        said.append(f"Inertias that differ from the URDF account for {of_all[INERTIAS]:.0%}.")
     return " ".join(said)
 
 
 def _weighed(named: NamedEffect) -> bool:
-    """Whether it rests on what was weighed, and no error need fall by it."""
+    """Whether it based on the known mass, and no error need fall by it."""
     return named.verdict is HeldOutVerdict.WEIGHED
 
 
@@ -166,14 +166,14 @@ def _left(found: Diagnosis) -> list[str]:
     if not known:
         return []
     worst = max(known, key=lambda joint: known[joint])
-    text = f"{_percent(found)} of the torque stays"
+    text = f"Residual {_percent(found)} of the torque"
     if known[worst] > 1.5 * found.after.mean_relative_moving:
         text += f", most on {worst} ({relative_in_words(known[worst])})"
     said = [text + "."]
     for each in found.unexplained[:1]:
         words = [covariate_in_words(covariate) for covariate in each.depends_on]
         listed = " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
-        said.append(f"What stays on {each.joint} depends on {listed}.")
+        said.append(f"The residual of {each.joint} depends on {listed}.")
     return said
 
 
@@ -198,6 +198,7 @@ def _next(found: Diagnosis) -> str:
         names += f" of {place_in_words(other, len(found.joint_names))}"
     if not by_motion:
         return (
-            f"Next: a run with a weighed load ({KNOWN_LOAD}), which tells {names}; no motion does."
+            f"Next: a run with a known payload ({KNOWN_LOAD}) distinguishes {names}; no motion "
+            "does."
         )
-    return f"Next: a motion that tells {names} (excite optimize … --after)."
+    return f"Next: a motion that distinguishes {names} (excite optimize … --after)."

@@ -86,7 +86,7 @@ Progress = Callable[[str, int], None]
 _OPEN = Finding(
     "open_setup",
     "warning",
-    "The set-up is in doubt (above): until that is settled, no effect but friction, offsets and "
+    "The set-up is in doubt (above): until it is resolved, no effect but friction, offsets and "
     "armature is confirmed. `excite inspect` has the keys",
 )
 
@@ -338,8 +338,8 @@ def _noticed(
         yield Finding(
             "one run",
             "warning",
-            f"All names rest on one recording, {training[0].name}: what is left out to test them "
-            "is a part of the same motion. Record a second motion, and names that do not hold go.",
+            f"Only one recording, {training[0].name}: training and test data share a motion. "
+            "Record a second motion, and spurious effects are rejected.",
             training[0].name,
         )
 

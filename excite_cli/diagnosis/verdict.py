@@ -25,4 +25,4 @@ class HeldOutVerdict(StrEnum):
     CONFIRMED = "confirmed"
     NOT_CONFIRMED = "not confirmed"
     HARMFUL = "harmful"
-    WEIGHED = "rests on what was weighed"
+    WEIGHED = "based on the known mass"

@@ -18,7 +18,7 @@ class WrenchGain(TorqueGain):
     scope: ClassVar = "base"
     on_base: ClassVar = False
     settled_by: ClassVar = (
-        "the weighed robot (identification.total_mass) or a weighed payload on a run "
+        "the known robot mass (identification.total_mass) or a known payload on a run "
         "(identification.known_payload)"
     )
     may_begin: ClassVar = True

@@ -47,10 +47,10 @@ def dependence_section(found: Diagnosis) -> Section:
         blocks.append(_map(found.traces.dependence))
     lead = (
         "After all effects are in, is what remains of the torque still a function of something? "
-        "Every joint's rest is tried against time, angles, speeds and accelerations of all joints, "
-        "and its own load, direction and history."
+        "Every joint's residual is tried against time, angles, speeds and accelerations of all "
+        "joints, and its own load, direction and history."
     )
-    return Section("diagnosis-unexplained", "What stays unexplained", tuple(blocks), lead)
+    return Section("diagnosis-unexplained", "Unexplained residual", tuple(blocks), lead)
 
 
 def _map(dependence: Dependence) -> Block:
@@ -58,17 +58,17 @@ def _map(dependence: Dependence) -> Block:
     rows = [int(k) for k in np.argsort(-most, kind="stable")[:_MOST_ROWS] if most[k] >= _SHOWN]
     if not rows:
         return Text(
-            f"No smooth function of a single quantity takes {_SHOWN:.0%} or more off the rest of "
-            "any joint that runs left out confirm."
+            f"No smooth function of a single quantity predicts {_SHOWN:.0%} or more of the "
+            "residual of any joint that runs left out confirm."
         )
     j = int(np.argmax(dependence.shares[:, rows[0]]))
     words = (
         f"Of {len(dependence.quantities)} quantities, {len(rows)} explain {_SHOWN:.0%} or more of "
-        f"the rest of some joint, at most {most[rows[0]]:.0%}: "
+        f"the residual of some joint, at most {most[rows[0]]:.0%}: "
         f"{covariate_in_words(dependence.quantities[rows[0]])} for {dependence.joints[j]}."
     )
     return share_map(
-        "Share of the rest that one quantity explains [%]",
+        "Share of the residual that one quantity explains [%]",
         words,
         [covariate_in_words(dependence.quantities[k]) for k in rows],
         dependence.joints,

@@ -23,7 +23,7 @@ from excite_cli.diagnosis.words import (
 )
 from excite_cli.report.page import Block, Section, Table, Text
 
-_COLUMNS = ("effect", "where", "size ± standard deviation", "p", "takes off", "gain", "held_out")
+_COLUMNS = ("effect", "where", "size ± standard deviation", "p", "reduction", "gain", "held_out")
 
 
 def found_section(found: Diagnosis) -> Section:
@@ -35,12 +35,12 @@ def found_section(found: Diagnosis) -> Section:
     if large:
         blocks.append(
             Table(
-                (*_COLUMNS, "cannot be told from"),
+                (*_COLUMNS, "indistinguishable from"),
                 tuple(_row(found, each) for each in large),
                 title="What the declared model lacks",
                 right=frozenset({3, 4, 5}),
                 note=(
-                    "takes off: its part of the fall of the mean error on held-out data, averaged "
+                    "reduction: Shapley share of the error reduction on held-out data, averaged "
                     "over orders of joining, so that all rows add up to it; gain: by which the "
                     "error on runs left out falls; held out: whether the effect lowers the error "
                     "on held-out data beside all others, and the change there in percentage points."
@@ -50,7 +50,7 @@ def found_section(found: Diagnosis) -> Section:
     if small:
         blocks.append(
             Table(
-                (*_COLUMNS, "cannot be told from"),
+                (*_COLUMNS, "indistinguishable from"),
                 tuple(_row(found, each) for each in small),
                 title=f"{len(small)} small ones (each below {SMALL_PART:.0%} of the fall)",
                 right=frozenset({3, 4, 5}),
@@ -138,7 +138,7 @@ def _absorbed(found: Diagnosis) -> Table:
         title=f"Not testable: {len(rows)} would show as other values of parameters",
         note=" ".join(
             [
-                "No data of this kind of motion can tell them from a change of these parameters.",
+                "Confounded with a change of these parameters in any motion of this kind.",
                 *settled_in_words(found),
             ]
         ),

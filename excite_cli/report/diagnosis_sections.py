@@ -41,7 +41,7 @@ def diagnosis_figures(diagnosis: Diagnosis) -> tuple[KeyFigure, ...]:
         ),
         KeyFigure("effects found", str(len(diagnosis.named)), kinds or _none(diagnosis)),
         KeyFigure(
-            "not told apart",
+            "not distinguished",
             str(open_questions),
             "effects with another name that fits as well" if open_questions else "every name holds",
         ),
@@ -99,9 +99,9 @@ def _errors(diagnosis: Diagnosis) -> Section:
         "On held-out data; raw: after, on the torque as recorded, without any filter.",
     )
     if diagnosis.skeleton is not None:
-        what = "Relative error that stays where the joint moves, on held-out data"
+        what = "Residual relative error where the joint moves, on held-out data"
         robot = robot_chart(
-            "Where it stays", diagnosis.skeleton, diagnosis.joint_names,
+            "Where the residual is", diagnosis.skeleton, diagnosis.joint_names,
             diagnosis.after.relative_moving, what,
         )  # fmt: skip
         (charts, *others) = blocks
@@ -137,14 +137,14 @@ def _next(diagnosis: Diagnosis) -> Section:
     pairs = experiment["pairs"]
     if not pairs:
         lead = (
-            "Nothing is left to tell apart: the next motion excites the model with the effects "
-            "that were found."
+            "No effects are left to distinguish: the next motion excites the model with the "
+            "effects that were found."
         )
         return Section("diagnosis-next", "Next motion", (_command(experiment),), lead)
     rows = tuple((_named(pair["effect"]), _named(pair["alias"])) for pair in pairs)
     lead = (
         f"{counted(len(rows), 'pair')} of effects fit these data as well as each other. The next "
-        "motion is planned to tell them apart."
+        "motion is planned to distinguish them."
     )
     table = Table(("found", "as good on these data"), rows)
     return Section("diagnosis-next", "Next motion", (table, _command(experiment)), lead)

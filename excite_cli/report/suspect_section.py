@@ -19,12 +19,12 @@ def suspect_section(found: Diagnosis) -> Section:
         blocks = (*first, Fold(f"The other {counted(len(later), 'round')}: {words}", tuple(later)))
     lead = (
         "Every round judges all candidates beside what was found before and takes the one that "
-        "saves most. Shown are the strongest suspects and the verdict on each: the p-value is "
+        "saves most. Shown are the strongest candidates and the verdict on each: the p-value is "
         "corrected for the number of tests; the share is of the residual at that point; the gain "
         "is by how much the error on runs left out falls. One that is refused now may be accepted "
         "in a later round."
     )
-    return Section("diagnosis-suspects", "Suspects, and why they were refused", blocks, lead)
+    return Section("diagnosis-suspects", "Rejected candidates, with reasons", blocks, lead)
 
 
 def _round(found: Diagnosis, each: Round) -> Table:
@@ -43,7 +43,7 @@ def _round(found: Diagnosis, each: Round) -> Table:
     )
     taken = {k for k, suspect in enumerate(each.suspects) if suspect.verdict is Verdict.ACCEPTED}
     return Table(
-        ("suspect", "where", "p", "share", "gain", "verdict"),
+        ("candidate", "where", "p", "share", "gain", "verdict"),
         rows,
         title=f"Round {each.index}: RMS residual up to {each.residual[worst]:.3g} ({worst})",
         right=frozenset({2, 3, 4}),

@@ -58,7 +58,7 @@ def diagnosis_answer(
     parts = diagnosis_parts(found, verbose)
     if not verbose:
         rounds = counted(len(found.rounds), "round")
-        parts.append(f"({rounds} of tests; --verbose shows the suspects of each, and why not.)")
+        parts.append(f"({rounds} of tests; --verbose shows the rejected candidates, with reasons.)")
     parts += [_next(experiment), next_command(config, place), *files_in_words(files)]
     return Answer(tuple(parts), {**diagnosis_data(found, experiment), "output": files}, found.good)
 
@@ -117,9 +117,9 @@ def _round_table(found: Diagnosis, each: Round) -> Table:
     )
     return Table(
         f"Round {each.index}: residual up to {each.residual[worst]:.3g} ({worst}); {each.verdict}",
-        ("suspect", "where", "p", "share", "gain", "verdict"),
+        ("candidate", "where", "p", "share", "gain", "verdict"),
         rows,
-        words=("suspect", "where", "verdict"),
+        words=("candidate", "where", "verdict"),
         bold=tuple(k for k, each in enumerate(each.suspects) if each.verdict is Verdict.ACCEPTED),
     )
 
@@ -162,7 +162,7 @@ def _verdict(found: Diagnosis) -> str:
 def _next(experiment: dict[str, Any]) -> str:
     if experiment["purpose"] == "separate":
         count = len(experiment["pairs"])
-        return f"Next motion: tell apart {count} pair{'s' if count > 1 else ''} of effects:"
+        return f"Next motion: distinguish {count} pair{'s' if count > 1 else ''} of effects:"
     return "Next motion: excite the extended model:"
 
 

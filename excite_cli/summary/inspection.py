@@ -50,8 +50,8 @@ def checks_table(found: Inspected) -> Table:
         for each in found.results
     )
     bold = tuple(k for k, each in enumerate(found.results) if each.status != "ok")
-    columns = ("check", "status", "joints", "settled by")
-    words = ("joints", "settled by")
+    columns = ("check", "status", "joints", "resolved by")
+    words = ("joints", "resolved by")
     return Table("Before any physics", columns, rows, columns, words, bold)
 
 

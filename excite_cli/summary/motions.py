@@ -102,15 +102,15 @@ def result_parts(result: Result) -> Parts:
 def invariants_in_words(found: Invariants) -> str:
     """Figures that are the same whichever columns are called base parameters."""
     words = (
-        "Whatever is called base parameters: torques at random states within the limits are "
-        f"predicted to {found.torque_deviation:.2g} of the noise of one sample (RMS)"
+        f"Predicted-torque standard deviation: {found.torque_deviation:.2g} σ of one sample (RMS "
+        "over random states within the limits, independent of the choice of base parameters)"
     )
     if found.efficiency is None or found.slack is None:
         return f"{words}."
     low = found.efficiency * np.exp(-found.slack)
     return (
-        f"{words}, and an instant holds {100 * low:.2g} to {100 * found.efficiency:.2g} % of the "
-        "information that freely chosen states could have (D-efficiency)."
+        f"{words}; information efficiency: {100 * low:.2g} to {100 * found.efficiency:.2g} % of "
+        "D-optimal free states."
     )
 
 
@@ -161,7 +161,7 @@ def margin_table(motions: Sequence[Motion]) -> Table:
 
 def outlook_table(outlook: dict[str, Any]) -> Table:
     """What the motions are expected to tell apart."""
-    title = f"Expected divergence ½Δ; from {outlook['told_apart_from']:g} on, told apart"
+    title = f"Expected divergence ½Δ; from {outlook['told_apart_from']:g} on, distinguished"
     names = ("effect", "alias", "so far", "then", "motions needed")
     rows = []
     for pair in outlook["pairs"]:

@@ -28,7 +28,7 @@ def found() -> Diagnosis:
 
 def test_nothing_is_open_where_the_newest_motion_is_predicted(found: Diagnosis) -> None:
     assert still_open(found, ()) == ()
-    assert still_open(found, ("a or b",)) == ("a or b: not told apart yet",)
+    assert still_open(found, ("a or b",)) == ("a or b: not distinguished yet",)
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def campaign(
 
 
 NOTHING: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
-PAIR = (("a or b: not told apart yet",), ("a or b",))
+PAIR = (("a or b: not distinguished yet",), ("a or b",))
 
 
 def test_it_ends_once_a_motion_looked_for_more_and_nothing_is_open() -> None:
@@ -133,7 +133,7 @@ def test_pairs_that_three_rounds_do_not_tell_apart_end_it() -> None:
     stuck = ended(campaign(PAIR, PAIR, PAIR), None)
     assert stuck.ended == "stuck"
     assert "a or b" in stuck.reason
-    other = (("c or d: not told apart yet",), ("c or d",))
+    other = (("c or d: not distinguished yet",), ("c or d",))
     assert ended(campaign(PAIR, PAIR, other), None).ended == ""
     more = ((*PAIR[0], "x"), PAIR[1])
     assert ended(campaign(PAIR, PAIR, more), None).ended == ""

@@ -68,9 +68,9 @@ def test_friction_is_one_share_and_the_rest_is_told_by_place(plain: Diagnosis) -
     assert shares(answer) == pytest.approx({"friction": 0.75, "spring": 0.25, "armature": 0.0})
     fall = 0.5 - answer.after.mean_relative_moving
     assert answer_in_words(answer) == (
-        "Friction is 75% of what your model misses, most on elbow (48 N·m at 1 rad/s). "
-        f"On shoulder_pitch: spring at the joint (6.9 kN·m/rad, {0.1 / fall:.0%} of what it "
-        "misses). 3.6% of the torque stays, most on slide (10%). "
+        "Friction accounts for 75% of the unmodelled torque, most on elbow (48 N·m at 1 rad/s). "
+        f"On shoulder_pitch: spring at the joint (6.9 kN·m/rad, {0.1 / fall:.0%} of the "
+        "unmodelled torque). Residual 3.6% of the torque, most on slide (10%). "
         "Next: go on with the model and its effects (--apply NEW.yaml)."
     )
 
@@ -86,7 +86,7 @@ def test_names_that_fit_as_well_are_to_be_told_apart_next(plain: Diagnosis) -> N
         found(plain, replace(less, aliases=(drag,)), replace(more, aliases=(armature,)))
     )
     assert told.endswith(
-        " Next: a motion that tells spring at the joint of elbow from inertia of the motor "
+        " Next: a motion that distinguishes spring at the joint of elbow from inertia of the motor "
         "(armature) (excite optimize … --after)."
     )
 
@@ -94,7 +94,8 @@ def test_names_that_fit_as_well_are_to_be_told_apart_next(plain: Diagnosis) -> N
 def test_one_effect_is_told_by_its_name(plain: Diagnosis) -> None:
     answer = found(plain, effect("load_dependent_friction", "elbow", RUBS, everywhere(plain, 0.4)))
     assert answer_in_words(answer).startswith(
-        "Friction that grows with load of elbow (2 N·m) is nearly all your model misses. "
+        "Friction that grows with load of elbow (2 N·m) accounts for nearly all of the unmodelled "
+        "torque. "
     )
 
 
@@ -105,8 +106,8 @@ def test_what_stays_is_told_with_what_it_depends_on(plain: Diagnosis) -> None:
                    left=(0.1, 0.1))  # fmt: skip
     told = answer_in_words(replace(answer, large_rests=(rest,)))
     assert (
-        "10% of the torque stays. What stays on elbow depends on history of angle of elbow and "
-        "time. Next: "
+        "Residual 10% of the torque. The residual of elbow depends on history of angle of elbow "
+        "and time. Next: "
     ) in told
 
 
@@ -117,7 +118,7 @@ def test_a_fit_of_kept_inertias_has_its_share(plain: Diagnosis) -> None:
         begin, untouched=begin.before, inertia_parts=everywhere(plain, 0.1)
     )  # fmt: skip
     assert shares(answer) == pytest.approx({"spring": 0.75, "inertias": 0.25})
-    assert "Inertias off the URDF's are 25%." in answer_in_words(answer)
+    assert "Inertias that differ from the URDF account for 25%." in answer_in_words(answer)
 
 
 def test_nothing_and_nothing_good(plain: Diagnosis) -> None:
@@ -133,7 +134,7 @@ def test_nothing_and_nothing_good(plain: Diagnosis) -> None:
 
 def test_files_of_earlier_versions_know_no_parts(plain: Diagnosis) -> None:
     assert shares(plain) == {}
-    assert answer_in_words(plain).startswith("Your model misses 1 effect, none of them large.")
+    assert answer_in_words(plain).startswith("Your model lacks 1 effect, none of them large.")
 
 
 def test_what_lowers_nothing_is_told_so_with_the_warnings(plain: Diagnosis) -> None:
@@ -162,19 +163,19 @@ def test_what_rests_on_a_weight_is_told_whatever_the_error_does(plain: Diagnosis
     lower = whole.after.mean_relative_moving - 1e-4
     same = replace(whole, before=replace(whole.after, mean_relative_moving=lower))
     assert answer_in_words(same).startswith(
-        "On elbow: wrong gain of the measured torque (0.04), by what was weighed. 3.6% of the"
+        "On elbow: wrong gain of the measured torque (0.04), given the known mass. Residual 3.6% of"
     )
     assert answer_in_words(same).endswith("Next: go on with the model and its effects "
                                           "(--apply NEW.yaml).")  # fmt: skip
     rival = replace(gain, aliases=(offset,))
     told = answer_in_words(replace(same, effects=(rival,)))
     assert told.endswith(
-        " Next: a run with a weighed load (identification.known_payload), which tells wrong "
+        " Next: a run with a known payload (identification.known_payload) distinguishes wrong "
         "gain of the measured torque of elbow from offset of the measured torque of slide; no "
         "motion does."
     )
     spring = replace(effect("spring", "elbow", SPRING, everywhere(plain, 0.1)), aliases=(offset,))
     first = replace(rival, parts=everywhere(plain, 0.2))
     told = answer_in_words(found(plain, first, spring))
-    assert " Next: a motion that tells spring at the joint of elbow from offset" in told
-    assert "by what was weighed. On elbow: spring at the joint (6.9 kN·m/rad" in told
+    assert " Next: a motion that distinguishes spring at the joint of elbow from offset" in told
+    assert "given the known mass. On elbow: spring at the joint (6.9 kN·m/rad" in told

@@ -142,7 +142,7 @@ def test_what_was_weighed_tells_the_scale_of_the_wrench(
         told = named["parameters"]["gain"]
         assert abs(told["value"] - size) < 3.0 * told["std"] + 0.002
         assert told["std"] < 0.005
-        assert named["verdict"] == "rests on what was weighed"
+        assert named["verdict"] == "based on the known mass"
         # A load tells a scale from an offset of the vertical force, the robot's weight does not.
         others = {each["kind"] for each in named["alias_set"]}
         assert ("torque_offset" in others) == (not load)
@@ -154,7 +154,7 @@ def test_a_scale_that_masses_take_up_is_told_with_what_settles_it(
     record(excite, folder / "base.yaml", motions, *SCALE)
     run = excite("diagnose", str(folder / "base.yaml"), "log.h5")
     assert run.returncode == 0
-    assert "wrench_gain is told by the weighed robot (identification.total_mass)" in run.stdout
+    assert "wrench_gain is told by the known robot mass (identification.total_mass)" in run.stdout
 
 
 @pytest.mark.parametrize(

@@ -146,7 +146,7 @@ def test_evidence_shows_the_law_and_its_figures(sections: dict[str, Section]) ->
     (chart,) = charts_of(sections["diagnosis-evidence"])
     assert chart.title == "Viscous friction: elbow"
     assert "2.00 ± 0.10 N·m·s/rad" in chart.caption
-    assert "cannot tell it from: nonlinear viscous friction on elbow" in chart.caption
+    assert "cannot distinguish it from: nonlinear viscous friction on elbow" in chart.caption
     assert "99.8%" in chart.alternative or "99.9%" in chart.alternative
     assert drawn(chart).startswith("speed [rad/s]")
 
@@ -154,8 +154,8 @@ def test_evidence_shows_the_law_and_its_figures(sections: dict[str, Section]) ->
 @pytest.mark.parametrize(
     ("beside", "told"),
     [
-        ((), "cannot tell it from: armature on elbow."),
-        (("spring",), "cannot tell it with spring at the joint on elbow from: "),
+        ((), "cannot distinguish it from: armature on elbow."),
+        (("spring",), "cannot distinguish it with spring at the joint on elbow from: "),
     ],
 )
 def test_evidence_tells_of_pairs(diagnosis: Diagnosis, beside: tuple[str, ...], told: str) -> None:
@@ -183,7 +183,7 @@ def test_evidence_tells_of_another_name_of_the_same_torque(
     assert section is not None
     told = charts_of(section)[0].caption
     assert f"It with {title_of('torque_offset')} on elbow is the same torque as" in told
-    assert "no motion tells them apart" in told
+    assert "no motion distinguishes them" in told
 
 
 def test_residuals_tell_held_out_from_training(sections: dict[str, Section]) -> None:

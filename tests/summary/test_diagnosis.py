@@ -104,7 +104,7 @@ def test_without_repeated_periods_nothing_is_said_of_noise(doubted: Diagnosis) -
 def test_pairs_that_cannot_be_told_from_one_effect() -> None:
     one, other, pair = (EffectRecord(kind, ("elbow",)) for kind in ("spring", "armature", "ripple"))
     found = replace(make_diagnosis(), joint_aliases=(JointAlias((one,), (other, pair)),))
-    told = "spring on elbow cannot be told from: armature on elbow with ripple on elbow"
+    told = "spring on elbow indistinguishable from: armature on elbow with ripple on elbow"
     assert told in " ".join(printed(found).split())
     data = diagnosis_answer(found, "arm.yaml", {}).data["joint_aliases"]
     assert data == [
@@ -121,7 +121,7 @@ def test_another_name_of_the_same_torque_is_told_as_such() -> None:
     other = EffectRecord("asymmetric_friction", ("elbow",))
     alias = JointAlias(tuple(parts), (other,))
     found = replace(make_diagnosis(), joint_aliases=(alias,))
-    told = "on elbow is the same torque as asymmetric_friction on elbow: no motion tells them apart"
+    told = "is the same torque as asymmetric_friction on elbow: no motion distinguishes them"
     assert told in " ".join(printed(found).split())
     (data,) = diagnosis_answer(found, "arm.yaml", {}).data["joint_aliases"]
     assert data["same_torque"]
@@ -267,7 +267,7 @@ def test_what_is_not_in_the_held_out_run_is_judged_where_it_is(
 
 @pytest.fixture(scope="module")
 def weighed() -> Diagnosis:
-    """A gain that rests on what was weighed, beside a small effect that lowers the error."""
+    """A gain that based on the known mass, beside a small effect that lowers the error."""
     found = make_diagnosis()
     gain = replace(
         found.effects[0],
@@ -294,9 +294,9 @@ def test_what_rests_on_a_weight_is_told_so_and_never_small(weighed: Diagnosis) -
     begin = replace(weighed.before, mean_relative=0.5, mean_relative_moving=0.5)
     text = printed(replace(weighed, effects=(gain, small, small), before=begin))
     assert "2 small ones" in text
-    assert "- rests on what was weighed" not in text.split("small ones")[1]
+    assert "- based on the known mass" not in text.split("small ones")[1]
     assert (
-        "torque_gain on elbow rests on what was weighed (identification.total_mass, "
+        "torque_gain on elbow is based on the known mass (identification.total_mass, "
         "identification.known_payload): other inertias would predict as well without it"
     ) in text
     assert text.count("held-out data are no test of it") == 1
@@ -306,8 +306,10 @@ def test_what_inertias_take_up_is_told_with_what_settles_it(weighed: Diagnosis) 
     kinds = ("torque_gain", "armature", "torque_gain", "wrench_gain", "kind_of_a_package")
     absorbed = tuple(Absorbed(kind, ("elbow",), ("Izz[elbow]",), 0.0) for kind in kinds)
     text = printed(replace(weighed, effects=(), absorbed=absorbed))
-    told = [line for line in text.splitlines() if " is told by " in line]
+    told = [line for line in text.splitlines() if " is identifiable with " in line]
     assert [line.split()[0] for line in told] == ["torque_gain", "wrench_gain"]
     assert "identification.known_payload" in told[0]
     assert "identification.total_mass" in told[1]
-    assert " is told by " not in printed(replace(weighed, absorbed=absorbed))  # weighed already
+    assert " is identifiable with " not in printed(
+        replace(weighed, absorbed=absorbed)
+    )  # weighed already
