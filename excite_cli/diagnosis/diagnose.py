@@ -87,7 +87,7 @@ _OPEN = Finding(
     "open_setup",
     "warning",
     "The set-up is in doubt (above): until it is resolved, no effect but friction, offsets and "
-    "armature is confirmed. `excite inspect` has the keys",
+    "armature is confirmed. The keys that resolve it: excite inspect",
 )
 
 

@@ -62,7 +62,7 @@ def found_section(found: Diagnosis) -> Section:
             Table(
                 (*_COLUMNS, "stands for"),
                 tuple(_row(found, each) for each in found.approximations),
-                title="Approximations: they come near something else that is there",
+                title="Surrogate terms (true form unknown)",
                 right=frozenset({3, 4, 5}),
             )
         )
@@ -135,7 +135,7 @@ def _absorbed(found: Diagnosis) -> Table:
     return Table(
         ("effect", "where", "would show as"),
         tuple(rows),
-        title=f"Not testable: {len(rows)} would show as other values of parameters",
+        title=f"Not identifiable: {len(rows)} candidates confounded with parameters",
         note=" ".join(
             [
                 "Confounded with a change of these parameters in any motion of this kind.",

@@ -137,7 +137,7 @@ def absorbed_parts(found: Diagnosis) -> Parts:
         for each in found.absorbed
     )
     table = Table(
-        "Not testable: these would show as other values of parameters",
+        "Not identifiable: confounded with parameters of the model",
         ("effect", "where", "absorbed by"),
         rows,
         left=("effect", "where"),

@@ -137,7 +137,7 @@ def _approximation_table(shown: Sequence[NamedEffect], everything: int) -> Table
         for each in shown
     )
     return Table(
-        "Approximations: they come near something else that is there",
+        "Surrogate terms (true form unknown)",
         ("effect", "where", _SIZE, "reduction", "held_out", "stands for"),
         rows,
         left=("effect",),

@@ -273,7 +273,7 @@ def test_what_was_weighed_and_what_would_settle_the_absorbed_is_told(diagnosis: 
             block.note
             for block in each.blocks
             if isinstance(block, Table)
-            if "Not test" in block.title
+            if "Not identifiable" in block.title
         ]
         for each in (free, told)
     ]

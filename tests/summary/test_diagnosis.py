@@ -45,7 +45,7 @@ def test_an_approximation_is_no_name_for_scripts(doubted: Diagnosis) -> None:
 
 def test_an_approximation_has_a_table_of_its_own(doubted: Diagnosis) -> None:
     text = printed(doubted)
-    assert "Approximations: they come near something else that is there" in text
+    assert "Surrogate terms (true form unknown)" in text
     assert REASON in text
     assert "What the declared model lacks" not in text
     assert "0 effects, 1 approximation" in text
@@ -56,12 +56,12 @@ def test_approximations_that_are_not_confirmed_are_one_line(doubted: Diagnosis) 
     found = replace(doubted, effects=(first, *doubted.effects[1:]))
     text = printed(found)
     assert "In the model, but not confirmed: viscous_friction on elbow (--verbose" in text
-    assert "Approximations" not in text
+    assert "Surrogate terms" not in text
     harmful = replace(first, verdict=HeldOutVerdict.HARMFUL)
     told = printed(replace(found, effects=(harmful, *found.effects[1:])))
     assert "viscous_friction on elbow (harmful) (--verbose" in told
     tables = [p for p in diagnosis_answer(found, "", {}, True).parts if isinstance(p, Table)]
-    assert any(table.title.startswith("Approximations") for table in tables)
+    assert any(table.title.startswith("Surrogate terms") for table in tables)
 
 
 def printed(found: Diagnosis) -> str:
