@@ -23,7 +23,7 @@ from excite_cli.diagnosis.words import (
 )
 from excite_cli.report.page import Block, Section, Table, Text
 
-_COLUMNS = ("effect", "where", "size ± standard deviation", "p", "reduction", "gain", "held_out")
+_COLUMNS = ("effect", "where", "size ± standard deviation", "p", "reduction", "gain", "held-out")
 
 
 def found_section(found: Diagnosis) -> Section:
@@ -60,7 +60,7 @@ def found_section(found: Diagnosis) -> Section:
     if found.approximations:
         blocks.append(
             Table(
-                (*_COLUMNS, "stands for"),
+                (*_COLUMNS, "likely true form"),
                 tuple(_row(found, each) for each in found.approximations),
                 title="Surrogate terms (true form unknown)",
                 right=frozenset({3, 4, 5}),

@@ -165,7 +165,7 @@ def _runs(diagnosis: Diagnosis) -> list[Table]:
         return []
     found = [each.effect for each in diagnosis.effects]
     every = (*diagnosis.declared, *found)
-    uses = (*((name, "training") for name in names), (diagnosis.held_out_run, "held_out"))
+    uses = (*((name, "training") for name in names), (diagnosis.held_out_run, "held-out"))
     rows = tuple(
         (name, use, ", ".join(_own(each) for each in every if _within(name, each.runs)) or "–")
         for name, use in uses

@@ -117,7 +117,7 @@ def _caption(found: Diagnosis, named: NamedEffect) -> str:
         text += _jointly(named, alias, everything)
     if named.approximates:
         what = approximation_in_words(named.approximates, covariate_in_words)
-        text += f" An approximation only: it stands for {what}."
+        text += f" A surrogate term; likely true form: {what}."
     return text
 
 

@@ -51,7 +51,7 @@ def fit_sections(stored: StoredFit) -> tuple[Section, ...]:
 def _errors(stored: StoredFit) -> Section:
     low, high = stored.error.interval
     blocks = error_blocks(
-        ("training", "held_out"),
+        ("training", "held-out"),
         stored.training_error,
         stored.error,
         by_joint(stored.fit.joint_names, stored.torque_units),

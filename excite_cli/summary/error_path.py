@@ -41,7 +41,7 @@ def _table(found: Diagnosis, path: ErrorPath) -> Table:
     )
     return Table(
         "Error with the first effects (left out: of the declared model's; held out: of the torque)",
-        ("effects", "with", "left out", "held_out", ""),
+        ("effects", "with", "left out", "held-out", ""),
         rows,
         left=("with", ""),
         bold=(path.smallest,),

@@ -72,10 +72,10 @@ def effect_table(shown: Sequence[NamedEffect], everything: int, verbose: bool) -
     )
     return Table(
         "What the declared model lacks (reduction: Shapley share of the error reduction)",
-        ("effect", "where", _SIZE, *(["p"] if verbose else []), "reduction", "held_out"),
+        ("effect", "where", _SIZE, *(["p"] if verbose else []), "reduction", "held-out"),
         rows,
         left=("effect",),
-        words=("where", _SIZE, "held_out"),
+        words=("where", _SIZE, "held-out"),
     )
 
 
@@ -138,8 +138,8 @@ def _approximation_table(shown: Sequence[NamedEffect], everything: int) -> Table
     )
     return Table(
         "Surrogate terms (true form unknown)",
-        ("effect", "where", _SIZE, "reduction", "held_out", "stands for"),
+        ("effect", "where", _SIZE, "reduction", "held-out", "likely true form"),
         rows,
         left=("effect",),
-        words=("where", _SIZE, "held_out", "stands for"),
+        words=("where", _SIZE, "held-out", "likely true form"),
     )

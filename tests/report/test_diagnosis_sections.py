@@ -255,7 +255,7 @@ def test_verdicts_on_held_out_data_stand_in_the_table_and_on_the_card(
     diagnosis: Diagnosis, sections: dict[str, Section]
 ) -> None:
     table = next(b for b in sections["diagnosis-found"].blocks if isinstance(b, Table))
-    assert table.rows[0][table.columns.index("held_out")] == "confirmed -6.00 pp"
+    assert table.rows[0][table.columns.index("held-out")] == "confirmed -6.00 pp"
     (chart,) = charts_of(sections["diagnosis-evidence"])
     assert "On held-out data: confirmed -6.00 pp." in chart.caption
     assert found_section(diagnosis).lead.count("which took no part, goes from") == 1
@@ -303,7 +303,7 @@ def test_every_run_is_listed_with_its_use_and_what_is_there_alone(diagnosis: Dia
     assert runs.rows == (
         ("a", "training", "–"),
         ("b", "training", "viscous friction of elbow"),
-        ("c", "held_out", "–"),
+        ("c", "held-out", "–"),
     )
     parts = {**diagnosis.processing, "runs": ["a", "b/1"]}
     (runs,) = (
