@@ -198,7 +198,6 @@ def _next(found: Diagnosis) -> str:
         names += f" of {place_in_words(other, len(found.joint_names))}"
     if not by_motion:
         return (
-            f"Next: a run with a known payload ({KNOWN_LOAD}) distinguishes {names}; no motion "
-            "does."
+            f"Next: a run with a known load ({KNOWN_LOAD}) distinguishes {names}; no motion does."
         )
     return f"Next: a motion that distinguishes {names} (excite optimize … --after)."

@@ -170,7 +170,7 @@ def test_what_rests_on_a_weight_is_told_whatever_the_error_does(plain: Diagnosis
     rival = replace(gain, aliases=(offset,))
     told = answer_in_words(replace(same, effects=(rival,)))
     assert told.endswith(
-        " Next: a run with a known payload (identification.known_payload) distinguishes wrong "
+        " Next: a run with a known load (identification.known_payload) distinguishes wrong "
         "gain of the measured torque of elbow from offset of the measured torque of slide; no "
         "motion does."
     )
