@@ -86,8 +86,8 @@ Progress = Callable[[str, int], None]
 _OPEN = Finding(
     "open_setup",
     "warning",
-    "The set-up is in doubt (above): until it is resolved, no effect but friction, offsets and "
-    "armature is confirmed. The keys that resolve it: excite inspect",
+    "The set-up is in doubt (above): until it is resolved, no effect beyond the textbook's is "
+    "confirmed. The keys that resolve it: excite inspect",
 )
 
 
