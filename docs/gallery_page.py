@@ -150,7 +150,7 @@ def _errors(found: Diagnosis) -> Table:
 def _unexplained(found: Diagnosis) -> list[str]:
     """What is left of every joint, and what these data cannot test."""
     return [
-        "## What stays unexplained",
+        "## Unexplained residual",
         bullets(f"**{escaped(joint)}**: {escaped(text)}" for joint, text in left_of(found).items()),
         *map(as_markdown, absorbed_parts(found)),
     ]

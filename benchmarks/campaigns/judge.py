@@ -236,7 +236,7 @@ def _fill(outcome: Outcome, found: Diagnosis, answer: Answer, result: Score) -> 
             "covariate": each.effect.covariate,
             "parameters": {n: [v.value, v.std] for n, v in each.parameters.items()},
             "p_value": each.p_value,
-            "share": each.predictable,
+            "share": each.share_of_residual,
             "judged": judged,
             "verdict": str(getattr(each, "verdict", None) or ""),
             "aliases": [

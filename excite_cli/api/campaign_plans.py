@@ -82,7 +82,8 @@ class RoundPlans:
         if not alone:
             path = self.folder / f"round_{number}_explore.h5"
             problem = self._problem(_showing(spec, (*known, *unseen)), number, 1)
-            self._say(f"round {number}: exploration motion for {len(unseen)} untested candidates")
+            what = f"exploration motion for {len(unseen)} untested candidate effects"
+            self._say(f"round {number}: {what}")
             logs = [self.folder / each.data for each in state.motions]
             result = self._planned(problem, path, logs)
             motions += self._motions(number, "explore", path, result, pace, len(motions))

@@ -43,7 +43,7 @@ class LoadProblem(Shown):
         """What the motion will tell."""
         e, seconds = self.expected, self.problem.trajectory.duration
         words = (
-            f"{seconds:.3g} s identify a payload of {e.mass:g} kg to ± {1e3 * e.mass_std:.2g} g "
+            f"{seconds:.3g} s will identify a load of {e.mass:g} kg to ± {1e3 * e.mass_std:.2g} g "
             f"and its centre to ± {1e3 * e.center_std:.2g} mm (one standard deviation, with the "
             "noise and the deviations of the fit)"
         )

@@ -243,8 +243,8 @@ def recordings_of(dataset: Dataset, held_out: str | None, model: Model) -> dict[
 def _noticed(found: Score, model: Model, held_out: bool) -> list[Finding]:
     if found.made is None:
         text = (
-            f"{found.model} holds no errors of its own data, so no tolerance judges these runs. "
-            "Give a fit, a diagnosis, or a config that `excite diagnose --apply` wrote."
+            f"{found.model} does not state how large its own errors were: no run can be judged by "
+            "it. Give a fit, a diagnosis, or a config that `excite diagnose --apply` wrote."
         )
         return [Finding("no_allowance", "warning", text)]
     changing = [effect.title for effect in model.effects if effect.of_campaign]

@@ -109,7 +109,7 @@ def _leaning(lean: Array, run: Run) -> Finding:
     axes = ", ".join(f"{np.degrees(x):+.1f}°" for x in lean)
     text = (
         f"the inertial unit says that the base leans by {angle:.1f}° from robot.base_orientation "
-        f"(about its x, y, z: {axes}): the floor is tilted, or the unit's mounting is. "
-        "`excite diagnose` distinguishes the two by gravity in the wrench (effect base_tilt)"
+        f"(about its x, y, z: {axes}): the floor is tilted, or the unit's mounting is. The "
+        "effect of gravity on the wrench decides which: `excite diagnose` looks for base_tilt"
     )
     return Finding("leaning", "warning", text, run.name)

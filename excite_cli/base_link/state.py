@@ -57,8 +57,8 @@ def base_state(robot: Robot, run: Run, spec: BaseStateSpec) -> BaseState:
     if np.abs(found.q[:, 4]).max(initial=0.0) > _FARTHEST:
         raise FileError(
             f"run '{run.label}': the base pitches by {np.abs(found.q[:, 4]).max():.2f} rad from "
-            f"robot.base_orientation; up to {_FARTHEST}, pitch is distinguishable from yaw and "
-            "roll. Give the orientation in which the robot stands."
+            f"robot.base_orientation; up to {_FARTHEST} can be distinguished from yaw and roll. "
+            "Give the orientation in which it stands."
         )
     return found
 

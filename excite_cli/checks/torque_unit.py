@@ -87,6 +87,10 @@ class TorqueUnit(SetupCheck):
             "(measurement.torque: motor), or a counterbalance"
         )
 
+    def has_effect(self, before: Setup, after: Setup) -> bool:
+        """A torque that holds nothing but friction spoils no effect of other joints."""
+        return bool((after.unit >= _UNKNOWN).any())
+
     def settings(self, names: Sequence[str], spec: Spec, before: Setup, after: Setup) -> Settings:
         """N·m in a unit of the file, of a torque that is declared as of the link."""
         off = np.flatnonzero(np.abs(np.log(after.unit / before.unit)) > 1e-9).tolist()

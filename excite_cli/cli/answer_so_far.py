@@ -9,9 +9,9 @@ from types import FrameType
 
 @contextmanager
 def answer_so_far(tell: Callable[[], None]) -> Iterator[Callable[[], bool]]:
-    """Whether Ctrl-C was pressed; the first time that only `tell`s, the second time it interrupts.
+    """Whether Ctrl-C was pressed: the first time it is reported, the second time it interrupts.
 
-    Signals are the main thread's: in any other nobody asks.
+    Signals are the main thread's: in any other thread none is seen.
     """
     asked = False
 

@@ -87,7 +87,7 @@ def campaign(
         typer.Option(
             "--plain",
             rich_help_panel=_BUDGET,
-            help="Plan no exploration motions for untested candidates.",
+            help="No exploration motions: only those that excite the model's own effects.",
         ),
     ] = False,
     effect: Annotated[

@@ -44,7 +44,7 @@ def compare(
     verbose: options.Verbose = False,
     no_progress: options.NoProgress = False,
 ) -> None:
-    """Test which parameters and effects changed between days.
+    """Report which parameters and effects changed between days, each with its test.
 
     Every parameter is tested for a day since which its value differs. The part that temperature or
     another column of the log explains is regressed out first, where there are days enough. The

@@ -68,7 +68,7 @@ class Terminal:
             _print_words(self.err, text)
 
     def tell(self, note: Note) -> None:
-        """Print what the library reports while it works."""
+        """Progress messages of the library."""
         if note.level is Level.DETAIL:
             self.detail(note.sentence)
         else:

@@ -21,7 +21,7 @@ def inspect(
         typer.Option(
             "--apply",
             metavar="NEW.yaml",
-            help="Write the config with what resolves faults and doubts, its comments kept.",
+            help="Write the config with the keys that resolve faults and doubts, comments kept.",
             rich_help_panel=OUTPUT,
         ),
     ] = None,
@@ -45,9 +45,9 @@ def inspect(
     """Look at log and model before any physics: mount, zeros, signs, order, units, clock, bodies.
 
     One row per check: ok, doubt or fault, the joints, the evidence, and the key of the config that
-    resolves it. One plain fit of the textbook model judges the set-up: the set-up with which the
-    model explains far more of the torques is the right one. Without data excite inspects the
-    robot's description alone.
+    resolves it. Set-up errors are judged by one plain fit of the textbook's model: the set-up with
+    which it explains far more of the torques is the right one. Without data the
+    robot's description alone is looked at.
 
     Exit status 1: something is wrong for certain.
 

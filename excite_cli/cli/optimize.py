@@ -43,9 +43,7 @@ def optimize(
     ] = None,
     purpose: Annotated[
         Purpose | None,
-        typer.Option(
-            "--for", help="payload: shortest motion that identifies a payload, given --fit."
-        ),
+        typer.Option("--for", help="payload: shortest motion that identifies one, given --fit."),
     ] = None,
     fit: Annotated[
         Path | None,
@@ -63,10 +61,7 @@ def optimize(
     ] = None,
     efficiency: Annotated[
         bool,
-        typer.Option(
-            "--efficiency",
-            help="Also the information efficiency relative to D-optimal free states.",
-        ),
+        typer.Option("--efficiency", help="Information efficiency relative to free states, too."),
     ] = False,
     seed: options.Seed = None,
     overrides: options.Set = None,
@@ -83,17 +78,18 @@ def optimize(
     """Find motions that make the inertial parameters, and effects that are listed, visible.
 
     Every stored motion keeps all constraints. With --after, the motion distinguishes the effects
-    that the diagnosis could not; if there are none, the motion excites the model with all effects
-    found, on top of the measured data. Exit status 1: no admissible motion exists or was found, and
-    the message names the constraint that prevents it.
+    that the diagnosis could not; if there are none, it excites the model with all effects found, on
+    top of the measured data. Exit status 1: no admissible motion exists or was found, and the
+    message names the constraint that prevents it.
 
-    With --for payload the motion is the shortest that identifies mass, centre and inertia of a
-    payload, given a fit of the robot alone; its config is written beside the result (.yaml).
+    With --for payload the motion is the shortest that identifies mass, centre and inertia of what
+    the robot carries, given a fit of the robot alone; its config is written beside the result
+    (.yaml).
 
     Ctrl-C stores the best motion so far, proved as well; --resume plans that motion again.
 
-    --starts plans each motion by multi-start with successive halving, which --workers processes or
-    a dask cluster share; the result is the same to the last digit for any number of workers.
+    With --starts each motion is the best of many starts (successive halving), which --workers
+    processes or a dask cluster share; the result is the same to the last digit.
 
     Examples:
       excite optimize ur10.yaml -o ur10.h5

@@ -22,7 +22,7 @@ def robots(
     verbose: options.Verbose = False,
     no_progress: options.NoProgress = False,
 ) -> None:
-    """List the available robots, or the joints of one robot with their limits.
+    """List the available robots, or the joints of one with their limits.
 
     The robots are those of the package example-robot-data. In a config, a name of the list stands
     after a prefix, as in `robot: {urdf: example-robot-data:ur10}`; a URDF of yours is given by its

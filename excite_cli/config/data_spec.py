@@ -163,7 +163,7 @@ class MeasurementSpec(Section):
     base: BaseStateSpec = Field(BaseStateSpec(), description="how the base moved meanwhile")
     trust: bool | tuple[str, ...] = Field(
         False,
-        description="checks of `excite inspect` whose doubts the user resolved, as [direction of "
+        description="checks of `excite inspect` whose doubts are resolved, as [direction of "
         "gravity]; true: mount, zeros, signs, order, units and clock are as the config says",
     )
     topic: str | None = Field(None, description="topic of a bag; default: the only JointState")

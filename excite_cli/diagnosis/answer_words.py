@@ -74,13 +74,13 @@ def _missing(found: Diagnosis) -> str:
     said = []
     friction = of_all.get(FRICTION, 0.0)
     if friction >= _WORTH_SAYING:
-        share = "nearly all" if friction > _NEARLY_ALL else f"{friction:.0%}"
+        what = "nearly all of" if friction > _NEARLY_ALL else f"{friction:.0%} of"
         rubbing = [each for each in found.effects if _rubs(each)]
         which, most = _friction(rubbing, found), _most_friction(rubbing, found)
-        said.append(f"{which} accounts for {share} of the unmodelled torque{most}.")
+        said.append(f"{which} accounts for {what} the unmodelled torque{most}.")
     said += [
-        f"On {_place(each, found)}: {title_of(each.effect.kind)} ({_first(each)}), based on "
-        "the known mass."
+        f"On {_place(each, found)}: {title_of(each.effect.kind)} ({_first(each)}), given the "
+        "known mass."
         for each in found.named
         if _weighed(each)
     ]
@@ -97,12 +97,12 @@ def _missing(found: Diagnosis) -> str:
             f"Your model lacks {counted(len(found.effects), 'effect')}, none of them large."
         )
     elif of_all.get(INERTIAS, 0.0) >= _WORTH_SAYING:
-        said.append(f"Deviations of inertias from the URDF account for {of_all[INERTIAS]:.0%}.")
+        said.append(f"Inertias that differ from the URDF account for {of_all[INERTIAS]:.0%}.")
     return " ".join(said)
 
 
 def _weighed(named: NamedEffect) -> bool:
-    """Whether it rests on what was weighed, and no error need fall by it."""
+    """Whether it based on the known mass, and no error need fall by it."""
     return named.verdict is HeldOutVerdict.WEIGHED
 
 
@@ -166,7 +166,7 @@ def _left(found: Diagnosis) -> list[str]:
     if not known:
         return []
     worst = max(known, key=lambda joint: known[joint])
-    text = f"Residual: {_percent(found)} of torque RMS"
+    text = f"Residual {_percent(found)} of the torque"
     if known[worst] > 1.5 * found.after.mean_relative_moving:
         text += f", most on {worst} ({relative_in_words(known[worst])})"
     said = [text + "."]
@@ -198,7 +198,6 @@ def _next(found: Diagnosis) -> str:
         names += f" of {place_in_words(other, len(found.joint_names))}"
     if not by_motion:
         return (
-            f"Next: record a run with a known load ({KNOWN_LOAD}) to distinguish {names}; no "
-            "motion distinguishes them."
+            f"Next: a run with a known load ({KNOWN_LOAD}) distinguishes {names}; no motion does."
         )
-    return f"Next: plan a motion that distinguishes {names} (excite optimize … --after)."
+    return f"Next: a motion that distinguishes {names} (excite optimize … --after)."

@@ -86,8 +86,8 @@ Progress = Callable[[str, int], None]
 _OPEN = Finding(
     "open_setup",
     "warning",
-    "The set-up is in doubt (above): until the config resolves the doubt, only friction, "
-    "offsets and motor inertia can be confirmed. `excite inspect` lists the config keys",
+    "The set-up is in doubt (above): until it is resolved, no effect beyond the textbook's is "
+    "confirmed. The keys that resolve it: excite inspect",
 )
 
 
@@ -337,8 +337,8 @@ def _noticed(
         yield Finding(
             "one run",
             "warning",
-            f"Only one recording, {training[0].name}: training and test share a motion. Record a "
-            "second motion, so that spurious effects are rejected.",
+            f"Only one recording, {training[0].name}: training and test data share a motion. "
+            "Record a second motion, and spurious effects are rejected.",
             training[0].name,
         )
 

@@ -354,7 +354,7 @@ class Diagnosis(Shown):
 
         Where nothing of it is in the held-out run, that error need not fall, but must not rise; it
         is on the held-out ends of the runs that carry it that the error falls. Nor need it fall by
-        what rests on what was weighed.
+        what based on the known mass.
         """
         absent = {(each.kind, each.runs) for each in self.assumed if not each.present}
         if self.effects and all(

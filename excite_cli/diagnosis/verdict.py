@@ -38,7 +38,3 @@ class HeldOutVerdict(StrEnum):
     NOT_CONFIRMED = "not confirmed"
     HARMFUL = "harmful"
     WEIGHED = "based on the known mass"
-
-    @classmethod
-    def _missing_(cls, value: object) -> "HeldOutVerdict | None":
-        return cls(_EARLIER[str(value)]) if value in _EARLIER else None

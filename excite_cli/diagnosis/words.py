@@ -54,7 +54,7 @@ def by_worth(
     """Those that carry at least `SMALL_PART` of the fall of the error, and the small ones.
 
     In each list what takes most off first; of what that is not known, what explains most. What is
-    harmful, of unknown part, or rests on what was weighed, is never small.
+    harmful, of unknown part, or based on the known mass, is never small.
     """
     ranked = sorted(
         effects,
@@ -225,11 +225,11 @@ def settled_in_words(found: Diagnosis) -> list[str]:
 
 
 def weighed_in_words(found: Diagnosis) -> list[str]:
-    """That held-out data are no test of what rests on what was weighed."""
+    """That held-out data are no test of what based on the known mass."""
     return [
         f"{each.effect.kind} on {place_in_words(each.effect, len(found.joint_names))} is based "
         f"on the known mass ({KNOWN_MASS}, {KNOWN_LOAD}): other inertias would predict as well "
-        f"without {each.effect.kind}, so held-out data cannot test this effect."
+        "without it, so that held-out data are no test of it."
         for each in found.effects
         if each.verdict is HeldOutVerdict.WEIGHED
     ]

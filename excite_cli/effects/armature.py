@@ -1,6 +1,6 @@
 """Inertia of motor and gear, turning with the joint: τ_j = I_a a_j.
 
-On joints that turn about one fixed direction it cannot be told from the link's own inertia.
+On joints that turn about one fixed direction it indistinguishable from the link's own inertia.
 """
 
 from collections.abc import Sequence

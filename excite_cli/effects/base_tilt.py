@@ -21,7 +21,7 @@ from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 
 _MISSED = 0.03  # of the tilt, one standard deviation
-_SEEN = "a lean of the base above 0.2 rad is obvious, and the linearised columns fail there"
+_SEEN = "a base that leans by more than 0.2 rad is visible, and the columns fail there"
 
 
 class BaseTilt(Effect):

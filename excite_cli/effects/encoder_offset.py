@@ -26,7 +26,7 @@ class EncoderOffset(Effect):
     parameters: ClassVar = (
         Parameter(
             "offset", "rad", 1e-3, 0.2, believed=(-0.2, 0.2),
-            because="a joint offset of more than 0.2 rad (m) is obvious",
+            because="an offset of more than 0.2 rad (m) is visible",
         ),
     )  # fmt: skip
     usual: ClassVar = True

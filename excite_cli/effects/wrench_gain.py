@@ -18,7 +18,7 @@ class WrenchGain(TorqueGain):
     scope: ClassVar = "base"
     on_base: ClassVar = False
     settled_by: ClassVar = (
-        "the known mass of the robot (identification.total_mass) or a known payload on a run "
+        "the known robot mass (identification.total_mass) or a known payload on a run "
         "(identification.known_payload)"
     )
     may_begin: ClassVar = True

@@ -42,7 +42,7 @@ Comments = dict[tuple[str, ...], str]
 
 _MARGIN, _LEAST_MARGIN = 0.002, 0.0005
 _UNBOUNDED_EFFORT = 1e6
-# Meshes nearer than this [m] cannot be told from contact by a table.
+# Meshes nearer than this [m] indistinguishable from contact by a table.
 _TABLED = 0.002
 _SELDOM_APART = 0.8
 _ROUNDS = 10

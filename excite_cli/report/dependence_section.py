@@ -50,9 +50,9 @@ def dependence_section(found: Diagnosis) -> Section:
             )
         blocks.append(_map(found.traces.dependence))
     lead = (
-        "With all effects in the model, does the residual torque still depend on a quantity? "
-        "The residual of every joint is tested against time, angles, speeds and accelerations of "
-        "all joints, and its own load, direction and history."
+        "After all effects are in, is what remains of the torque still a function of something? "
+        "Every joint's residual is tried against time, angles, speeds and accelerations of all "
+        "joints, and its own load, direction and history."
     )
     return Section("diagnosis-unexplained", "Unexplained residual", tuple(blocks), lead)
 
@@ -62,8 +62,8 @@ def _map(dependence: Dependence) -> Block:
     rows = [int(k) for k in np.argsort(-most, kind="stable")[:_MOST_ROWS] if most[k] >= _SHOWN]
     if not rows:
         return Text(
-            f"No smooth function of a single quantity explains {_SHOWN:.0%} or more of the "
-            "residual of any joint, confirmed by cross-validation over runs."
+            f"No smooth function of a single quantity predicts {_SHOWN:.0%} or more of the "
+            "residual of any joint that runs left out confirm."
         )
     j = int(np.argmax(dependence.shares[:, rows[0]]))
     words = (

@@ -23,15 +23,7 @@ from excite_cli.diagnosis.words import (
 )
 from excite_cli.report.page import Block, Section, Table, Text
 
-_COLUMNS = (
-    "effect",
-    "where",
-    "size ± standard deviation",
-    "p",
-    "error reduction",
-    "gain",
-    "held-out error",
-)
+_COLUMNS = ("effect", "where", "size ± standard deviation", "p", "reduction", "gain", "held-out")
 
 
 def found_section(found: Diagnosis) -> Section:
@@ -48,10 +40,10 @@ def found_section(found: Diagnosis) -> Section:
                 title="What the declared model lacks",
                 right=frozenset({3, 4, 5}),
                 note=(
-                    "error reduction: Shapley share of the reduction of the mean error on held-out "
-                    "data, so that all rows add up to the total reduction; gain: reduction of the "
-                    "cross-validation error over runs; held-out error: whether the effect lowers "
-                    "the held-out error beside all others, and the change in percentage points."
+                    "reduction: Shapley share of the error reduction on held-out data, averaged "
+                    "over orders of joining, so that all rows add up to it; gain: by which the "
+                    "error on runs left out falls; held out: whether the effect lowers the error "
+                    "on held-out data beside all others, and the change there in percentage points."
                 ),
             )
         )
@@ -146,11 +138,10 @@ def _absorbed(found: Diagnosis) -> Table:
     return Table(
         ("effect", "where", "confounded with"),
         tuple(rows),
-        title=f"Not identifiable: {len(rows)} candidates confounded with other parameters",
+        title=f"Not identifiable: {len(rows)} candidates confounded with parameters",
         note=" ".join(
             [
-                "No data of this kind of motion distinguish these candidates from a change of "
-                "these parameters.",
+                "Confounded with a change of these parameters in any motion of this kind.",
                 *settled_in_words(found),
             ]
         ),

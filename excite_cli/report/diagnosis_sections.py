@@ -41,7 +41,7 @@ def diagnosis_figures(diagnosis: Diagnosis) -> tuple[KeyFigure, ...]:
         ),
         KeyFigure("effects found", str(len(diagnosis.named)), kinds or _none(diagnosis)),
         KeyFigure(
-            "ambiguous",
+            "not distinguished",
             str(open_questions),
             "effects with indistinguishable alternatives"
             if open_questions
@@ -101,9 +101,9 @@ def _errors(diagnosis: Diagnosis) -> Section:
         "On held-out data; raw: after, on the torque as recorded, without any filter.",
     )
     if diagnosis.skeleton is not None:
-        what = "Relative residual where the joint moves, on held-out data"
+        what = "Residual relative error where the joint moves, on held-out data"
         robot = robot_chart(
-            "Residual by joint", diagnosis.skeleton, diagnosis.joint_names,
+            "Where the residual is", diagnosis.skeleton, diagnosis.joint_names,
             diagnosis.after.relative_moving, what,
         )  # fmt: skip
         (charts, *others) = blocks
@@ -139,12 +139,15 @@ def _next(diagnosis: Diagnosis) -> Section:
     experiment = next_experiment(diagnosis)
     pairs = experiment["pairs"]
     if not pairs:
-        lead = "No effects are ambiguous: the next motion excites the model with the effects found."
+        lead = (
+            "No effects are left to distinguish: the next motion excites the model with the "
+            "effects that were found."
+        )
         return Section("diagnosis-next", "Next motion", (_command(experiment),), lead)
     rows = tuple((_named(pair["effect"]), _named(pair["alias"])) for pair in pairs)
     lead = (
-        f"{counted(len(rows), 'pair')} of effects fit these data equally well. The next motion is "
-        "planned to distinguish the effects of each pair."
+        f"{counted(len(rows), 'pair')} of effects fit these data as well as each other. The next "
+        "motion is planned to distinguish them."
     )
     table = Table(("found", "indistinguishable from"), rows)
     return Section("diagnosis-next", "Next motion", (table, _command(experiment)), lead)

@@ -112,7 +112,7 @@ def _caption(found: Diagnosis, named: NamedEffect) -> str:
     everything = len(found.joint_names)
     if named.aliases:
         others = [f"{title_of(a.kind)} on {place_in_words(a, everything)}" for a in named.aliases]
-        text += f" Indistinguishable in these data from: {', '.join(others)}."
+        text += f" These data cannot distinguish it from: {', '.join(others)}."
     for alias in found.joint_aliases:
         text += _jointly(named, alias, everything)
     if named.approximates:
@@ -133,11 +133,9 @@ def _jointly(named: NamedEffect, alias: JointAlias, everything: int) -> str:
     )
     whole = f"it{f' with {company}' if company else ''}"
     if alias.same_torque:
-        return (
-            f" {whole.capitalize()} produces the same torque as {others}: no motion distinguishes "
-            "them."
-        )
-    return f" In these data {whole} is indistinguishable from: {others}."
+        same = f" {whole.capitalize()} is the same torque as {others}"
+        return f"{same}: no motion distinguishes them."
+    return f" These data cannot distinguish {whole} from: {others}."
 
 
 def _picture(trace: EffectTrace) -> Picture:

@@ -18,13 +18,13 @@ def suspect_section(found: Diagnosis) -> Section:
         words = f"round {last}" if len(later) == 1 else f"rounds {_OPEN_ROUNDS + 1} to {last}"
         blocks = (*first, Fold(f"The other {counted(len(later), 'round')}: {words}", tuple(later)))
     lead = (
-        "Every round tests all candidates beside the effects found before and accepts the one that "
-        "reduces the residual most. The tables show the strongest candidates and their verdicts: "
-        "the p-value is corrected for the number of tests; the share is of the residual at that "
-        "point; the gain is the reduction of the cross-validation error over runs. A later round "
-        "may accept a candidate that this round rejected."
+        "Every round judges all candidates beside what was found before and takes the one that "
+        "saves most. Shown are the strongest candidates and the verdict on each: the p-value is "
+        "corrected for the number of tests; the share is of the residual at that point; the gain "
+        "is by how much the error on runs left out falls. One that is refused now may be accepted "
+        "in a later round."
     )
-    return Section("diagnosis-candidates", "Rejected candidates", blocks, lead)
+    return Section("diagnosis-suspects", "Rejected candidates, with reasons", blocks, lead)
 
 
 def _round(found: Diagnosis, each: Round) -> Table:

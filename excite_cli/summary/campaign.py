@@ -67,8 +67,8 @@ def campaign_answer(campaign: Campaign, folder: Path, written: dict[str, str]) -
     count = len(campaign.motions)
     total = (
         f"{len(campaign.rounds)} rounds, {count} motions, {campaign.seconds:.0f} s of motion. "
-        "(torque std: predicted-torque standard deviation at random states, in σ of one sample; "
-        "efficiency: information efficiency relative to D-optimal free states)"
+        "(torques known to: share of one sample's noise, at random states; efficiency: information "
+        "efficiency relative to D-optimal free states)"
     )
     files = tuple(f"{what}: {folder / name}" for what, name in written.items())
     data = {

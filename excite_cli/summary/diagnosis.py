@@ -58,7 +58,7 @@ def diagnosis_answer(
     parts = diagnosis_parts(found, verbose)
     if not verbose:
         rounds = counted(len(found.rounds), "round")
-        parts.append(f"({rounds} of tests; --verbose lists the rejected candidates with reasons.)")
+        parts.append(f"({rounds} of tests; --verbose shows the rejected candidates, with reasons.)")
     parts += [_next(experiment), next_command(config, place), *files_in_words(files)]
     return Answer(tuple(parts), {**diagnosis_data(found, experiment), "output": files}, found.good)
 
@@ -137,8 +137,8 @@ def absorbed_parts(found: Diagnosis) -> Parts:
         for each in found.absorbed
     )
     table = Table(
-        "Not identifiable: confounded with other parameters",
-        ("effect", "where", "confounded with"),
+        "Not identifiable: confounded with parameters of the model",
+        ("effect", "where", "absorbed by"),
         rows,
         left=("effect", "where"),
         words=("confounded with",),

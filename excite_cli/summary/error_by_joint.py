@@ -10,7 +10,7 @@ from excite_cli.summary.cells import figure, percent
 from excite_cli.summary.named_effects import what_and_where
 from excite_cli.summary.noise_floor import floor_cells, floor_columns
 
-_OFF = "error reduction by [pp]"
+_OFF = "reduced by (pp)"
 _NAMED, _WORTH = 3, 0.1  # parts that are named in a row, and the least share of the fall
 _NOTHING = 5e-4
 _SEEN = 0.005  # share of the first error below which a part is one of the others
@@ -139,7 +139,7 @@ def _parts(found: Diagnosis) -> Table:
         after = found.after.relative_moving[joint]
         rows.append(("", _LINES[2], f"{100 * after:.2f}", figure(after * scale), unit[joint]))
     return Table(
-        "Error reduction by effect (Shapley share, every order refitted), where joints move",
+        "Error reduction by effect (Shapley share: mean over orders), where joints move",
         ("joint", "model", "error, %", "RMS", "unit"),
         tuple(rows),
         left=("joint", "unit"),

@@ -48,7 +48,7 @@ def friction_table(lines: Sequence[FrictionLine]) -> Table:
         for line in lines
     )
     return Table(
-        "Equivalent Coulomb and viscous friction (line through all friction of a joint, ± std)",
+        "Equivalent Coulomb and viscous friction of each joint (straight line, ± std)",
         ("joint", "viscous", "unit", "Coulomb", "unit"),
         rows,
         left=("joint", "unit"),

@@ -103,14 +103,14 @@ def invariants_in_words(found: Invariants) -> str:
     """Figures that are the same whichever columns are called base parameters."""
     words = (
         f"Predicted-torque standard deviation: {found.torque_deviation:.2g} σ of one sample (RMS "
-        "at random states, independent of the choice of base parameters)"
+        "over random states within the limits, independent of the choice of base parameters)"
     )
     if found.efficiency is None or found.slack is None:
         return f"{words}."
     low = found.efficiency * np.exp(-found.slack)
     return (
-        f"{words}. Information efficiency: {100 * low:.2g} to {100 * found.efficiency:.2g} % "
-        "relative to D-optimal free states."
+        f"{words}; information efficiency: {100 * low:.2g} to {100 * found.efficiency:.2g} % of "
+        "D-optimal free states."
     )
 
 
@@ -161,8 +161,8 @@ def margin_table(motions: Sequence[Motion]) -> Table:
 
 def outlook_table(outlook: dict[str, Any]) -> Table:
     """What the motions are expected to tell apart."""
-    title = f"Expected divergence ½Δ (distinguishable from {outlook['told_apart_from']:g} on)"
-    names = ("effect", "indistinguishable from", "so far", "then", "motions needed")
+    title = f"Expected divergence ½Δ; from {outlook['told_apart_from']:g} on, distinguished"
+    names = ("effect", "alias", "so far", "then", "motions needed")
     rows = []
     for pair in outlook["pairs"]:
         needed = pair["motions_needed"]

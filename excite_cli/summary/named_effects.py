@@ -1,4 +1,4 @@
-"""Tables of the effects that a diagnosis named, and what each cannot be told from."""
+"""Tables of the effects that a diagnosis named, and what each indistinguishable from."""
 
 from collections.abc import Sequence
 
@@ -23,7 +23,7 @@ _SIZE = "size ± std"
 
 
 def effect_parts(found: Diagnosis, verbose: bool) -> Parts:
-    """The named effects, small ones in one line, and what each cannot be told from."""
+    """The named effects, small ones in one line, and what each indistinguishable from."""
     everything = len(found.joint_names)
     curves, own = ([], set()) if verbose else friction_rows(found)
     named = [each for each in found.named if not _is_part(each, own)]
@@ -71,27 +71,20 @@ def effect_table(shown: Sequence[NamedEffect], everything: int, verbose: bool) -
         for named in shown
     )
     return Table(
-        "What the declared model lacks (error reduction: Shapley share, held-out data)",
-        (
-            "effect",
-            "where",
-            _SIZE,
-            *(["p"] if verbose else []),
-            "error reduction",
-            "held-out error",
-        ),
+        "What the declared model lacks (reduction: Shapley share of the error reduction)",
+        ("effect", "where", _SIZE, *(["p"] if verbose else []), "reduction", "held-out"),
         rows,
         left=("effect",),
-        words=("where", _SIZE, "held-out error"),
+        words=("where", _SIZE, "held-out"),
     )
 
 
 def other_names(named: NamedEffect, everything: int) -> list[str]:
-    """What it cannot be told from: by these data, and by any."""
+    """What it indistinguishable from: by these data, and by any."""
     what, found = what_and_where(named.effect, everything), []
     if named.aliases:
         others = ", ".join(what_and_where(alias, everything) for alias in named.aliases)
-        found.append(f"{what} is indistinguishable from: {others}")
+        found.append(f"{what} indistinguishable from: {others}")
     if same := other_name_of(named.effect.kind):
         found.append(f"{what} produces the same torque as {' and '.join(same)}")
     return found
@@ -103,8 +96,8 @@ def _joint_alias(alias: JointAlias, everything: int) -> str:
         for side in (alias.named, alias.others)
     )
     if alias.same_torque:
-        return f"{named} produces the same torque as {others}: no motion distinguishes them"
-    return f"{named} is indistinguishable from: {others}"
+        return f"{named} is the same torque as {others}: no motion distinguishes them"
+    return f"{named} indistinguishable from: {others}"
 
 
 def what_and_where(record: EffectRecord, everything: int) -> str:
@@ -145,8 +138,8 @@ def _approximation_table(shown: Sequence[NamedEffect], everything: int) -> Table
     )
     return Table(
         "Surrogate terms (true form unknown)",
-        ("effect", "where", _SIZE, "error reduction", "held-out error", "likely true form"),
+        ("effect", "where", _SIZE, "reduction", "held-out", "likely true form"),
         rows,
         left=("effect",),
-        words=("where", _SIZE, "held-out error", "likely true form"),
+        words=("where", _SIZE, "held-out", "likely true form"),
     )

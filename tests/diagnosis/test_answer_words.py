@@ -70,8 +70,8 @@ def test_friction_is_one_share_and_the_rest_is_told_by_place(plain: Diagnosis) -
     assert answer_in_words(answer) == (
         "Friction accounts for 75% of the unmodelled torque, most on elbow (48 N·m at 1 rad/s). "
         f"On shoulder_pitch: spring at the joint (6.9 kN·m/rad, {0.1 / fall:.0%} of the "
-        "unmodelled torque). Residual: 3.6% of torque RMS, most on slide (10%). "
-        "Next: use the model with its effects (--apply NEW.yaml)."
+        "unmodelled torque). Residual 3.6% of the torque, most on slide (10%). "
+        "Next: go on with the model and its effects (--apply NEW.yaml)."
     )
 
 
@@ -86,16 +86,16 @@ def test_names_that_fit_as_well_are_to_be_told_apart_next(plain: Diagnosis) -> N
         found(plain, replace(less, aliases=(drag,)), replace(more, aliases=(armature,)))
     )
     assert told.endswith(
-        " Next: plan a motion that distinguishes spring at the joint of elbow from inertia of "
-        "the motor (armature) (excite optimize … --after)."
+        " Next: a motion that distinguishes spring at the joint of elbow from inertia of the motor "
+        "(armature) (excite optimize … --after)."
     )
 
 
 def test_one_effect_is_told_by_its_name(plain: Diagnosis) -> None:
     answer = found(plain, effect("load_dependent_friction", "elbow", RUBS, everywhere(plain, 0.4)))
     assert answer_in_words(answer).startswith(
-        "Load-dependent friction of elbow (2 N·m) accounts for nearly all of the "
-        "unmodelled torque. "
+        "Friction that grows with load of elbow (2 N·m) accounts for nearly all of the unmodelled "
+        "torque. "
     )
 
 
@@ -106,8 +106,8 @@ def test_what_stays_is_told_with_what_it_depends_on(plain: Diagnosis) -> None:
                    left=(0.1, 0.1))  # fmt: skip
     told = answer_in_words(replace(answer, large_rests=(rest,)))
     assert (
-        "Residual: 10% of torque RMS. The residual of elbow depends on history of angle of "
-        "elbow and time. Next: "
+        "Residual 10% of the torque. The residual of elbow depends on history of angle of elbow "
+        "and time. Next: "
     ) in told
 
 
@@ -118,7 +118,7 @@ def test_a_fit_of_kept_inertias_has_its_share(plain: Diagnosis) -> None:
         begin, untouched=begin.before, inertia_parts=everywhere(plain, 0.1)
     )  # fmt: skip
     assert shares(answer) == pytest.approx({"spring": 0.75, "inertias": 0.25})
-    assert "Deviations of inertias from the URDF account for 25%." in answer_in_words(answer)
+    assert "Inertias that differ from the URDF account for 25%." in answer_in_words(answer)
 
 
 def test_nothing_and_nothing_good(plain: Diagnosis) -> None:
@@ -163,23 +163,19 @@ def test_what_rests_on_a_weight_is_told_whatever_the_error_does(plain: Diagnosis
     lower = whole.after.mean_relative_moving - 1e-4
     same = replace(whole, before=replace(whole.after, mean_relative_moving=lower))
     assert answer_in_words(same).startswith(
-        "On elbow: wrong gain of the measured torque (0.04), based on the known mass. "
-        "Residual: 3.6%"
+        "On elbow: wrong gain of the measured torque (0.04), given the known mass. Residual 3.6% of"
     )
     assert answer_in_words(same).endswith("Next: use the model with its effects "
                                           "(--apply NEW.yaml).")  # fmt: skip
     rival = replace(gain, aliases=(offset,))
     told = answer_in_words(replace(same, effects=(rival,)))
     assert told.endswith(
-        " Next: record a run with a known load (identification.known_payload) to "
-        "distinguish wrong gain of "
-        "the measured torque of elbow from offset of the measured torque of slide; no "
-        "motion distinguishes them."
+        " Next: a run with a known load (identification.known_payload) distinguishes wrong "
+        "gain of the measured torque of elbow from offset of the measured torque of slide; no "
+        "motion does."
     )
     spring = replace(effect("spring", "elbow", SPRING, everywhere(plain, 0.1)), aliases=(offset,))
     first = replace(rival, parts=everywhere(plain, 0.2))
     told = answer_in_words(found(plain, first, spring))
-    assert (
-        " Next: plan a motion that distinguishes spring at the joint of elbow from offset" in told
-    )
-    assert "based on the known mass. On elbow: spring at the joint (6.9 kN·m/rad" in told
+    assert " Next: a motion that distinguishes spring at the joint of elbow from offset" in told
+    assert "given the known mass. On elbow: spring at the joint (6.9 kN·m/rad" in told

@@ -118,7 +118,7 @@ def test_absurd_sizes_are_told_with_their_reason() -> None:
         ("contact", np.array([3e-3, 0.0, 0.0]), "no touch"),
         ("elasticity", np.array([1.0 / 54.0]), "54 N·m/rad (N/m) would bend by 0.37 rad (m)"),
         ("stribeck_friction", np.array([243.0]), "more than the largest torque"),
-        ("base_tilt", np.array([0.3, 0.0]), "is obvious"),
+        ("base_tilt", np.array([0.3, 0.0]), "is visible"),
         ("viscous_friction", np.array([-3.0]), "cannot be negative"),
         ("torque_delay", np.array([-2e-4]), "-0.2 ms is less than time stamps are true to"),
     ):

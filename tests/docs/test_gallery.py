@@ -23,7 +23,7 @@ def test_a_page_has_all_its_sections_and_small_pictures(robot: str) -> None:
     text = path.read_text(encoding="utf-8")
     headings = re.findall(r"^## (.*)$", text, re.MULTILINE)
     assert headings[:5] == ["The log", "What the declared model leaves", "Names",
-                            "Before and after", "What stays unexplained"]  # fmt: skip
+                            "Before and after", "Unexplained residual"]  # fmt: skip
     pictures = _PICTURE.findall(text)
     assert len(pictures) >= 4
     assert sorted(pictures) == sorted(each.name for each in TARGET.glob(f"{robot}-*.png"))

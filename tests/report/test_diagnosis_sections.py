@@ -146,9 +146,7 @@ def test_evidence_shows_the_law_and_its_figures(sections: dict[str, Section]) ->
     (chart,) = charts_of(sections["diagnosis-evidence"])
     assert chart.title == "Viscous friction: elbow"
     assert "2.00 ± 0.10 N·m·s/rad" in chart.caption
-    assert (
-        "Indistinguishable in these data from: nonlinear viscous friction on elbow" in chart.caption
-    )
+    assert "cannot distinguish it from: nonlinear viscous friction on elbow" in chart.caption
     assert "99.8%" in chart.alternative or "99.9%" in chart.alternative
     assert drawn(chart).startswith("speed [rad/s]")
 
@@ -156,8 +154,8 @@ def test_evidence_shows_the_law_and_its_figures(sections: dict[str, Section]) ->
 @pytest.mark.parametrize(
     ("beside", "told"),
     [
-        ((), "In these data it is indistinguishable from: armature on elbow."),
-        (("spring",), "it with spring at the joint on elbow is indistinguishable from: "),
+        ((), "cannot distinguish it from: armature on elbow."),
+        (("spring",), "cannot distinguish it with spring at the joint on elbow from: "),
     ],
 )
 def test_evidence_tells_of_pairs(diagnosis: Diagnosis, beside: tuple[str, ...], told: str) -> None:
@@ -184,7 +182,7 @@ def test_evidence_tells_of_another_name_of_the_same_torque(
     section = effect_section(found)
     assert section is not None
     told = charts_of(section)[0].caption
-    assert f"It with {title_of('torque_offset')} on elbow produces the same torque as" in told
+    assert f"It with {title_of('torque_offset')} on elbow is the same torque as" in told
     assert "no motion distinguishes them" in told
 
 
@@ -257,7 +255,7 @@ def test_verdicts_on_held_out_data_stand_in_the_table_and_on_the_card(
     diagnosis: Diagnosis, sections: dict[str, Section]
 ) -> None:
     table = next(b for b in sections["diagnosis-found"].blocks if isinstance(b, Table))
-    assert table.rows[0][table.columns.index("held-out error")] == "confirmed, 6.00 pp lower"
+    assert table.rows[0][table.columns.index("held-out")] == "confirmed -6.00 pp"
     (chart,) = charts_of(sections["diagnosis-evidence"])
     assert "Held-out error: confirmed, 6.00 pp lower." in chart.caption
     assert found_section(diagnosis).lead.count("which took no part, goes from") == 1

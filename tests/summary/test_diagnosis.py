@@ -56,7 +56,7 @@ def test_approximations_that_are_not_confirmed_are_one_line(doubted: Diagnosis) 
     found = replace(doubted, effects=(first, *doubted.effects[1:]))
     text = printed(found)
     assert "In the model, but not confirmed: viscous_friction on elbow (--verbose" in text
-    assert "Approximations" not in text
+    assert "Surrogate terms" not in text
     harmful = replace(first, verdict=HeldOutVerdict.HARMFUL)
     told = printed(replace(found, effects=(harmful, *found.effects[1:])))
     assert "viscous_friction on elbow (harmful) (--verbose" in told
@@ -104,7 +104,7 @@ def test_without_repeated_periods_nothing_is_said_of_noise(doubted: Diagnosis) -
 def test_pairs_that_cannot_be_told_from_one_effect() -> None:
     one, other, pair = (EffectRecord(kind, ("elbow",)) for kind in ("spring", "armature", "ripple"))
     found = replace(make_diagnosis(), joint_aliases=(JointAlias((one,), (other, pair)),))
-    told = "spring on elbow is indistinguishable from: armature on elbow with ripple on elbow"
+    told = "spring on elbow indistinguishable from: armature on elbow with ripple on elbow"
     assert told in " ".join(printed(found).split())
     data = diagnosis_answer(found, "arm.yaml", {}).data["joint_aliases"]
     assert data == [
@@ -121,10 +121,7 @@ def test_another_name_of_the_same_torque_is_told_as_such() -> None:
     other = EffectRecord("asymmetric_friction", ("elbow",))
     alias = JointAlias(tuple(parts), (other,))
     found = replace(make_diagnosis(), joint_aliases=(alias,))
-    told = (
-        "on elbow produces the same torque as asymmetric_friction on elbow: no motion "
-        "distinguishes them"
-    )
+    told = "is the same torque as asymmetric_friction on elbow: no motion distinguishes them"
     assert told in " ".join(printed(found).split())
     (data,) = diagnosis_answer(found, "arm.yaml", {}).data["joint_aliases"]
     assert data["same_torque"]
@@ -272,7 +269,7 @@ def test_what_is_not_in_the_held_out_run_is_judged_where_it_is(
 
 @pytest.fixture(scope="module")
 def weighed() -> Diagnosis:
-    """A gain that rests on what was weighed, beside a small effect that lowers the error."""
+    """A gain that based on the known mass, beside a small effect that lowers the error."""
     found = make_diagnosis()
     gain = replace(
         found.effects[0],
@@ -298,11 +295,11 @@ def test_what_rests_on_a_weight_is_told_so_and_never_small(weighed: Diagnosis) -
     small = replace(gain, verdict=HeldOutVerdict.CONFIRMED)
     begin = replace(weighed.before, mean_relative=0.5, mean_relative_moving=0.5)
     text = printed(replace(weighed, effects=(gain, small, small), before=begin))
-    assert "2 small effects" in text
-    assert "- based on the known mass" not in text.split("small effects")[1]
+    assert "2 small ones" in text
+    assert "- based on the known mass" not in text.split("small ones")[1]
     assert (
         "torque_gain on elbow is based on the known mass (identification.total_mass, "
-        "identification.known_payload): other inertias would predict as well without torque_gain"
+        "identification.known_payload): other inertias would predict as well without it"
     ) in text
     assert text.count("held-out data cannot test this effect") == 1
 
