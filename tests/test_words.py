@@ -15,10 +15,10 @@ BANNED = re.compile(
     r"weighed|rests on|trifle)\b",
     re.IGNORECASE,
 )
-# Names that programs read: options of 0.2, messages between processes, links within a page.
+# Names that programs read: options and verdicts of 0.2, messages between processes.
 NAMES = {
     ("cli/app.py", "sealed"),
-    ("report/suspect_section.py", "diagnosis-suspects"),
+    ("diagnosis/verdict.py", "rests on what was weighed"),
     ("workers/at_hand.py", "workers at hand"),
     ("workers/child.py", "told"),
     ("workers/processes.py", "told"),

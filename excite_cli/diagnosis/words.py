@@ -225,11 +225,11 @@ def settled_in_words(found: Diagnosis) -> list[str]:
 
 
 def weighed_in_words(found: Diagnosis) -> list[str]:
-    """That held-out data are no test of what based on the known mass."""
+    """That held-out data are no test of what is based on the known mass."""
     return [
         f"{each.effect.kind} on {place_in_words(each.effect, len(found.joint_names))} is based "
         f"on the known mass ({KNOWN_MASS}, {KNOWN_LOAD}): other inertias would predict as well "
-        "without it, so that held-out data are no test of it."
+        f"without {each.effect.kind}, so held-out data cannot test this effect."
         for each in found.effects
         if each.verdict is HeldOutVerdict.WEIGHED
     ]

@@ -24,7 +24,7 @@ def suspect_section(found: Diagnosis) -> Section:
         "is by how much the error on runs left out falls. One that is refused now may be accepted "
         "in a later round."
     )
-    return Section("diagnosis-suspects", "Rejected candidates, with reasons", blocks, lead)
+    return Section("diagnosis-candidates", "Rejected candidates, with reasons", blocks, lead)
 
 
 def _round(found: Diagnosis, each: Round) -> Table:

@@ -138,7 +138,7 @@ def absorbed_parts(found: Diagnosis) -> Parts:
     )
     table = Table(
         "Not identifiable: confounded with parameters of the model",
-        ("effect", "where", "absorbed by"),
+        ("effect", "where", "confounded with"),
         rows,
         left=("effect", "where"),
         words=("confounded with",),

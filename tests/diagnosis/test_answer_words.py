@@ -71,7 +71,7 @@ def test_friction_is_one_share_and_the_rest_is_told_by_place(plain: Diagnosis) -
         "Friction accounts for 75% of the unmodelled torque, most on elbow (48 N·m at 1 rad/s). "
         f"On shoulder_pitch: spring at the joint (6.9 kN·m/rad, {0.1 / fall:.0%} of the "
         "unmodelled torque). Residual 3.6% of the torque, most on slide (10%). "
-        "Next: go on with the model and its effects (--apply NEW.yaml)."
+        "Next: use the model with its effects (--apply NEW.yaml)."
     )
 
 
@@ -94,7 +94,7 @@ def test_names_that_fit_as_well_are_to_be_told_apart_next(plain: Diagnosis) -> N
 def test_one_effect_is_told_by_its_name(plain: Diagnosis) -> None:
     answer = found(plain, effect("load_dependent_friction", "elbow", RUBS, everywhere(plain, 0.4)))
     assert answer_in_words(answer).startswith(
-        "Friction that grows with load of elbow (2 N·m) accounts for nearly all of the unmodelled "
+        "Load-dependent friction of elbow (2 N·m) accounts for nearly all of the unmodelled "
         "torque. "
     )
 

@@ -255,7 +255,7 @@ def test_verdicts_on_held_out_data_stand_in_the_table_and_on_the_card(
     diagnosis: Diagnosis, sections: dict[str, Section]
 ) -> None:
     table = next(b for b in sections["diagnosis-found"].blocks if isinstance(b, Table))
-    assert table.rows[0][table.columns.index("held-out")] == "confirmed -6.00 pp"
+    assert table.rows[0][table.columns.index("held-out")] == "confirmed, 6.00 pp lower"
     (chart,) = charts_of(sections["diagnosis-evidence"])
     assert "Held-out error: confirmed, 6.00 pp lower." in chart.caption
     assert found_section(diagnosis).lead.count("which took no part, goes from") == 1

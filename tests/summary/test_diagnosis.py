@@ -295,8 +295,8 @@ def test_what_rests_on_a_weight_is_told_so_and_never_small(weighed: Diagnosis) -
     small = replace(gain, verdict=HeldOutVerdict.CONFIRMED)
     begin = replace(weighed.before, mean_relative=0.5, mean_relative_moving=0.5)
     text = printed(replace(weighed, effects=(gain, small, small), before=begin))
-    assert "2 small ones" in text
-    assert "- based on the known mass" not in text.split("small ones")[1]
+    assert "2 small effects" in text
+    assert "- based on the known mass" not in text.split("small effects")[1]
     assert (
         "torque_gain on elbow is based on the known mass (identification.total_mass, "
         "identification.known_payload): other inertias would predict as well without it"
