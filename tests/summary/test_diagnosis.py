@@ -299,7 +299,7 @@ def test_what_rests_on_a_weight_is_told_so_and_never_small(weighed: Diagnosis) -
     assert "- based on the known mass" not in text.split("small effects")[1]
     assert (
         "torque_gain on elbow is based on the known mass (identification.total_mass, "
-        "identification.known_payload): other inertias would predict as well without it"
+        "identification.known_payload): other inertias would predict as well without torque_gain"
     ) in text
     assert text.count("held-out data cannot test this effect") == 1
 
