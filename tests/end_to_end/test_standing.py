@@ -154,7 +154,10 @@ def test_a_scale_that_masses_take_up_is_told_with_what_settles_it(
     record(excite, folder / "base.yaml", motions, *SCALE)
     run = excite("diagnose", str(folder / "base.yaml"), "log.h5")
     assert run.returncode == 0
-    assert "wrench_gain is identifiable with the known robot mass (identification.total_mass)" in run.stdout
+    assert (
+        "wrench_gain is identifiable with the known robot mass (identification.total_mass)"
+        in run.stdout
+    )
 
 
 @pytest.mark.parametrize(

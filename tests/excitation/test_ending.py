@@ -69,7 +69,9 @@ def test_what_is_not_reached_is_said_first_and_is_bad() -> None:
     assert not answer.good
     first = answer.parts[0]
     assert isinstance(first, str)
-    assert first.startswith("sequence.until is NOT REACHED with 12 s of motion in all: torques")
+    assert first.startswith(
+        "sequence.until is NOT REACHED with 12 s of motion in all: predicted-torque"
+    )
     assert "instead of 0.001 (about" in first
     assert "instead of 90 %" in first
 
