@@ -142,7 +142,7 @@ def _looked(case: Case, recorded: Dataset, settled: Mapping[str, Any]) -> tuple[
     Of a unit or a clock that is not `settled` yet they would say what is wrong.
     """
     told = [e for e in recorded.findings if e.severity != "note" or e.kind == "wrapped"]
-    found = rows.of_files(merged(told))
+    found = rows.of_files(merged(told), case.spec)
     if any(each.status == "fault" or {*each.settings} - {*settled} for each in found):
         return found, False
     data = completed(case, recorded)

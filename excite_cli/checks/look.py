@@ -7,7 +7,7 @@ from the start. What no mistake explains is left to the diagnosis.
 from collections.abc import Sequence
 from dataclasses import replace
 
-from excite_cli.checks import foreign_runs, sentences, standing_legs
+from excite_cli.checks import foreign_runs, rows, sentences, standing_legs
 from excite_cli.checks.own import Log, own_checks
 from excite_cli.checks.result import Result
 from excite_cli.checks.samples import samples_of
@@ -76,10 +76,12 @@ def findings_of(
     prepared: Sequence[PreparedRun],
     processing: Processing,
     spec: Spec,
+    seen: Sequence[Finding] = (),
 ) -> tuple[tuple[Finding, ...], bool]:
     """What is to be known of runs that are fitted: motion, and what `look` doubts.
 
-    And whether a doubt is open, until which is settled no effect is confirmed.
+    And whether a doubt is open, of these or of what was `seen` in the files: until it is resolved
+    no effect is confirmed.
 
     Raises
     ------
@@ -91,7 +93,8 @@ def findings_of(
     if spec.measurement.filter.position == "auto":
         motion = check_motion(runs, processing, robot.joint_names)
     doubts = [each.finding for each in found if each.status != "ok"]
-    return (*motion, *doubts), any(each.is_open for each in found)
+    is_open = any(each.is_open for each in (*found, *rows.of_files(seen, spec)))
+    return (*motion, *doubts), is_open and spec.measurement.trust is not True
 
 
 def without_fault(found: Sequence[Result]) -> Sequence[Result]:

@@ -14,7 +14,7 @@ from excite_cli.checks import (
 from excite_cli.checks.own import own_checks
 from excite_cli.checks.result import Result, Status
 from excite_cli.checks.set_up import CHECKS
-from excite_cli.checks.trust import is_trusted
+from excite_cli.checks.trust import but_trusted, is_trusted
 from excite_cli.config.spec import Spec
 from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.model import Robot
@@ -41,6 +41,7 @@ NAMES = (
 )  # fmt: skip
 _OTHER = "what else was noticed"
 _TRUSTED = "not judged: measurement.trust names it"
+_SPEEDS = "measurement.channels"  # leaves recorded speeds out, which no fit needs
 _STATUS: dict[str, Status] = {"error": "fault", "warning": "doubt", "note": "ok"}
 
 
@@ -54,17 +55,23 @@ def of_description(robot: Robot) -> list[Result]:
     ]
 
 
-def of_files(findings: Sequence[Finding]) -> list[Result]:
-    """Results of what was seen while files were read."""
+def of_files(findings: Sequence[Finding], spec: Spec) -> list[Result]:
+    """Results of what was seen while files were read; doubts of trusted checks are none.
+
+    A doubt that asks for another config is open. A fault has a key of its own.
+    """
     row = {kind: name for name, kinds in _OF_FILES.items() for kind in kinds}
     row |= {check.kind: check.name for check in CHECKS}
-    return [
+    found = [
         Result(
             row.get(each.kind, _OTHER), each.kind, _STATUS[each.severity], each.text, each.joints,
             each.run, each.settings,
+            is_open=each.severity == "warning" and bool({*each.settings} - {_SPEEDS}),
         )
         for each in findings
     ]  # fmt: skip
+    faults = [each for each in found if each.status == "fault"]
+    return [*faults, *but_trusted((each for each in found if each.status != "fault"), spec)]
 
 
 def names() -> tuple[str, ...]:
@@ -75,9 +82,11 @@ def names() -> tuple[str, ...]:
 def in_order(found: Sequence[Result], judged: bool, spec: Spec) -> tuple[Result, ...]:
     """Results by the order of rows; a row without any is fine, if it was `judged` or trusted."""
     rows: list[Result] = []
+    seen = {*_OF_DESCRIPTION, *_OF_FILES}  # trusted or not
     for name in (*names(), _OTHER):
         own = [each for each in found if each.name == name]
         if not own and (judged or name in _OF_DESCRIPTION) and name != _OTHER:
-            own = [Result(name, "", "ok", _TRUSTED if is_trusted(name, spec) else "")]
+            is_judged = name in seen or not is_trusted(name, spec)
+            own = [Result(name, "", "ok", "" if is_judged else _TRUSTED)]
         rows += own
     return tuple(rows)

@@ -8,7 +8,7 @@ from excite_cli.measurement.dataset import Mask
 from excite_cli.robot.model import Robot
 
 _SLACK = 0.1  # of a joint's range, by which limits of descriptions may be passed
-_STEP = np.radians(25.0)
+_STEP = np.radians(25.0)  # half of the widest step in which zeros are sought, and some
 _TURNS = 2.0 * np.pi * np.arange(-1, 2)  # rad; an angle says nothing of whole turns
 
 

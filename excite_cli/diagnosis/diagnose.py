@@ -91,11 +91,6 @@ _OPEN = Finding(
 )
 
 
-def _is_doubt_of_the_setup(finding: Finding) -> bool:
-    """Whether what was seen in the files asks for another config, but for recorded speeds."""
-    return finding.severity == "warning" and bool({*finding.settings} - {"measurement.channels"})
-
-
 def _never(chosen: Sequence[int], rest: Sequence[int], rows: Sequence[int]) -> bool:
     """No data left out miss what a wrong set-up may stand for."""
     return False
@@ -141,7 +136,9 @@ def diagnose(
     standing = standing_still(training, robot.joint_names)
     model = _model(robot, base, spec)
     kept = prepare_all(parts.held_out, processing)  # refused early where too short
-    suspicious, is_open = findings_of(robot, parts.training, training, processing, spec)
+    suspicious, is_open = findings_of(
+        robot, parts.training, training, processing, spec, dataset.findings
+    )
     traced, bodies = _traced(model, spec, parts, processing, progress, over)
     with_ends = with_ends_held_out(parts, runs_of_their_own(traced.effects), processing)
     if with_ends.ends and not over():
@@ -174,7 +171,6 @@ def diagnose(
     held = Played(robot, [*kept, *prepare_all(parts.ends, processing)])
     with_all = held.predictions(models[1])
     missed = compared.missed if compared else None
-    is_open = is_open or any(map(_is_doubt_of_the_setup, dataset.findings))
     if is_open:
         missed = _never
     worth = worth_on_held_out(held, traced, with_all, over_error(traced, final), missed)

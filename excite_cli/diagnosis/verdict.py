@@ -2,14 +2,6 @@
 
 from enum import StrEnum
 
-# Values in files of version 0.2.
-_EARLIER = {
-    "impossible sign": "physically infeasible sign",
-    "later": "deferred",
-    "another explains it": "redundant",
-    "rests on what was weighed": "based on the known mass",
-}
-
 
 class Verdict(StrEnum):
     """Accepted, or why not."""
@@ -21,10 +13,6 @@ class Verdict(StrEnum):
     NO_GAIN = "no gain on runs left out"
     LATER = "deferred"
     EXPLAINED = "redundant"
-
-    @classmethod
-    def _missing_(cls, value: object) -> "Verdict | None":
-        return cls(_EARLIER[str(value)]) if value in _EARLIER else None
 
 
 class HeldOutVerdict(StrEnum):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from excite_cli.config.load import load_spec
+from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.diagnosis.verdict import HeldOutVerdict
@@ -34,8 +35,8 @@ def dataset() -> Dataset:
     return simulate(ROBOT, motions, settings, [friction(), by_load]).dataset
 
 
-def told(data: Dataset) -> Diagnosis:
-    return diagnose(ROBOT, find_base_parameters(ROBOT), data, SPEC)
+def told(data: Dataset, spec: Spec = SPEC) -> Diagnosis:
+    return diagnose(ROBOT, find_base_parameters(ROBOT), data, spec)
 
 
 def confirmed(found: Diagnosis) -> set[str]:
@@ -53,3 +54,11 @@ def test_what_is_confirmed_waits_for_the_setup(dataset: Dataset) -> None:
 def test_speeds_that_nothing_needs_are_no_doubt(dataset: Dataset) -> None:
     gain = Finding("gain", "warning", "odd", "", (), {"measurement.channels": {"dq": None}})
     assert "load_dependent_friction" in confirmed(told(replace(dataset, findings=(gain,))))
+
+
+@pytest.mark.parametrize("trust", ["[clock]", "true"])
+def test_a_doubt_that_the_config_resolves_is_not_open(dataset: Dataset, trust: str) -> None:
+    clock = Finding("clock", "warning", "a second lasts 0.7 s", "", (), {"measurement.clock": 0.7})
+    words = [f"diagnosis.kinds={KINDS}", f"measurement.trust={trust}"]
+    found = told(replace(dataset, findings=(clock,)), load_spec(SMOKE, words))
+    assert "load_dependent_friction" in confirmed(found)

@@ -67,9 +67,8 @@ APPROXIMATIONS = [
 
 
 @pytest.mark.parametrize(("found", "text"), APPROXIMATIONS)
-@pytest.mark.parametrize("earlier", [False, True])
-def test_approximations_are_records_and_a_text_that_earlier_versions_wrote_alone(
-    diagnosis: Diagnosis, tmp_path: Path, found: Approximation, text: str, earlier: bool
+def test_approximations_are_records_beside_a_text_for_people(
+    diagnosis: Diagnosis, tmp_path: Path, found: Approximation, text: str
 ) -> None:
     doubted = replace(diagnosis.effects[0], approximates=found)
     path = tmp_path / "doubted.h5"
@@ -80,10 +79,7 @@ def test_approximations_are_records_and_a_text_that_earlier_versions_wrote_alone
         (left,) = json.loads(file["records/large_rests"][()])
         assert left["depends_on"] == ["q[elbow]", "load[elbow]"]
         del file["records/effects"]
-        if earlier:
-            del record["approximation"]
-        else:  # the text is for people
-            record["approximates"] = "in other words"
+        record["approximates"] = "in other words"
         file["records/effects"] = json.dumps([record])
     assert read_diagnosis(path).effects[0].approximates == found
 
