@@ -12,6 +12,7 @@ from excite_cli.checks.look import look
 from excite_cli.checks.result import Result
 from excite_cli.checks.samples import samples_of
 from excite_cli.checks.sentences import BELONG
+from excite_cli.checks.set_up import _candidates
 from excite_cli.checks.setup import Setup
 from excite_cli.checks.textbook_fit import TextbookFit
 from excite_cli.config.amended import with_values
@@ -243,3 +244,21 @@ def test_bodies_of_no_mass_are_unlikely(robot: Robot, sound: Dataset) -> None:
     declared = Setup.as_declared(robot)
     assert fit(replace(declared, unit=1e-4 * declared.unit)).bent > 15.0
     assert fit(declared).bent < 5.0
+
+
+def test_what_puts_a_joint_beyond_its_limits_is_not_tried(robot: Robot, sound: Dataset) -> None:
+    """Positions of other joints in the elbow's place, where the elbow cannot go."""
+    data = changed(sound, lambda run: replace(run, q=run.q + 2.5 * at(2), dq=None))
+    lower, upper = robot.limits.lower.copy(), robot.limits.upper.copy()
+    lower[2], upper[2] = 1.5, 3.5
+    narrow = replace(robot, limits=replace(robot.limits, lower=lower, upper=upper))
+    prepared = prepare_all(data.runs, choose_processing(data.runs, SPEC.measurement.filter))
+
+    def exchanges_of_the_elbow(of: Robot) -> list[str]:
+        fit = TextbookFit(of, samples_of(prepared, 100))
+        declared = Setup.as_declared(of)
+        every = (each.alternative for each in _candidates(fit, fit, SPEC, declared, fit(declared)))
+        return [x.variant for x in every if x.variant in ("positions", "columns") and 2 in x.joints]
+
+    assert exchanges_of_the_elbow(robot)
+    assert not exchanges_of_the_elbow(narrow)
