@@ -42,7 +42,7 @@ def found_section(found: Diagnosis) -> Section:
                 note=(
                     "reduction: Shapley share of the error reduction on held-out data, averaged "
                     "over orders of joining, so that all rows add up to it; gain: by which the "
-                    "error on runs left out falls; held out: whether the effect lowers the error "
+                    "error on runs left out falls; held-out: whether the effect lowers the error "
                     "on held-out data beside all others, and the change there in percentage points."
                 ),
             )
