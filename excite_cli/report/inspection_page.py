@@ -14,7 +14,7 @@ def inspection_page(found: Inspected, title: str) -> Page:
         sections.append(Section("evidence", "Evidence", tuple(map(Text, texts))))
     if found.settings:
         rows = tuple((key, written({key: value})) for key, value in found.settings.items())
-        cures = Table(("key", "line that excite inspect --apply writes"), rows, wordy=frozenset({1}))
+        cures = Table(("key", "line that inspect --apply writes"), rows, wordy=frozenset({1}))
         sections.append(Section("settings", "What would change in the config", (cures,)))
     return Page(
         title,
