@@ -9,8 +9,7 @@ from threadpoolctl import threadpool_limits
 from benchmarks.coal_gradients import CoalGradients
 from benchmarks.problems import problem
 from benchmarks.timing import interleaved
-from excite_cli.constraints.self_collision import SelfCollision
-from excite_cli.geometry.clearance import Clearance
+from excite_cli.constraints.self_collision import Clearance, SelfCollision
 from excite_cli.geometry.collision_pairs import CollisionPairs
 
 

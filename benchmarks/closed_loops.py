@@ -28,7 +28,7 @@ import numpy as np
 from benchmarks.battery.scoring import Name, same
 from excite_cli import motions_of, read_diagnosis
 from excite_cli.api.loading import load_problem
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
+from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import random_baseline
 from excite_cli.excitation.result import Result

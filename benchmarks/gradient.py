@@ -9,8 +9,11 @@ from benchmarks.bare import BareCalls
 from benchmarks.problems import WITHOUT_GEOMETRY, motion, problem
 from benchmarks.timing import interleaved
 from excite_cli.criteria.smooth_condition_number import SmoothConditionNumber
-from excite_cli.excitation.differences import central_differences, forward_differences
-from excite_cli.excitation.gradient_check import block_gradient
+from excite_cli.excitation.gradient_check import (
+    block_gradient,
+    central_differences,
+    forward_differences,
+)
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.task import MotionTask
 

@@ -18,7 +18,7 @@ from excite_cli.api.planning import plan
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.identification.identify import identify
 from excite_cli.identification.load import LoadIdentification, identify_load
-from excite_cli.identification.stored_fit import StoredFit
+from excite_cli.identification.stored_model import StoredFit
 from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate, takes_of

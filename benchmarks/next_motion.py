@@ -145,7 +145,7 @@ def measured_divergence(case: Case, folder: Path, pair: tuple[str, str]) -> floa
     from excite_cli.diagnosis.tracing import Model, trace
     from excite_cli.dynamics.base_parameters import find_base_parameters
     from excite_cli.effects.catalogue import declared_effects
-    from excite_cli.identification.left_out import LeftOut
+    from excite_cli.identification.declared_states import LeftOut
     from excite_cli.identification.prepare import PreparedRun, prepare
     from excite_cli.identification.processing import choose_processing
     from excite_cli.identification.split import split

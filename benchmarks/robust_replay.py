@@ -21,7 +21,7 @@ from excite_cli.config.spec import Spec
 from excite_cli.constraints.balance import Balance
 from excite_cli.constraints.ground_contact import Contact, ZeroMomentPoint
 from excite_cli.constraints.joint_torque import JointTorque
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.dynamics.uncertain_inertias import box
 from excite_cli.dynamics.whole_robot import whole_parameters
 from excite_cli.excitation.problem import Problem, build_problem

@@ -33,7 +33,7 @@ from excite_cli.api.identifying import identify
 from excite_cli.api.inspecting import inspect
 from excite_cli.api.loading import Case, load_case
 from excite_cli.checks.result import Result
-from excite_cli.config.amended import with_values
+from excite_cli.config.commented_yaml import with_values
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION
 from excite_cli.errors import ExciteError

@@ -17,7 +17,7 @@ from scipy.optimize import minimize
 
 from excite_cli.constraints.base import Array
 from excite_cli.criteria.base import Criterion
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.excitation.correction import (
     Mask,
     chosen_rows,

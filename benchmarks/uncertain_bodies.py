@@ -13,7 +13,7 @@ import argparse
 import numpy as np
 
 from benchmarks.problems import problem
-from excite_cli.config.uncertainty_spec import UncertaintySpec
+from excite_cli.config.spec import UncertaintySpec
 from excite_cli.constraints.base import Array
 from excite_cli.dynamics.regressor import Regressor
 from excite_cli.dynamics.uncertain_inertias import inertia_uncertainty

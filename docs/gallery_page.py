@@ -8,13 +8,10 @@ from excite_cli.diagnosis.answer_words import answer_in_words
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.diagnosis.words import approximation_in_words, ends_in_words, rests_in_words
 from excite_cli.measurement.dataset import Dataset
-from excite_cli.shown.command import Command
-from excite_cli.shown.table import Part, Table
-from excite_cli.summary.diagnosis import absorbed_parts
+from excite_cli.shown.answer import Command, Part, Table
+from excite_cli.summary.diagnosis import absorbed_parts, path_parts
 from excite_cli.summary.error_by_joint import error_tables
-from excite_cli.summary.error_path import path_parts
-from excite_cli.summary.friction_lines import friction_table
-from excite_cli.summary.named_effects import approximation_parts, effect_parts
+from excite_cli.summary.named_effects import approximation_parts, effect_parts, friction_table
 
 HEAD = "---\nhide: [toc]\n---\n\n<!-- Made by `python -m docs.make_gallery`; edit nothing here. -->"
 # Figures of the first answer, and of the others; torque in time has one for each held-out run.

@@ -30,7 +30,7 @@ from excite_cli.report.style import (
     VERMILION,
     save_figure,
 )
-from excite_cli.shown.command import Command
+from excite_cli.shown.answer import Command
 from excite_cli.summary.diagnosis_data import diagnosis_data
 
 TARGET = Path(__file__).parent / "gallery"

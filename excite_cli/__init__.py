@@ -82,9 +82,9 @@ if TYPE_CHECKING:
     from excite_cli.proposal.propose import Proposal as Proposal
     from excite_cli.scoring.changes import Change as Change
     from excite_cli.scoring.changes import Changes as Changes
+    from excite_cli.scoring.records import Replay as Replay
     from excite_cli.scoring.records import Score as Score
     from excite_cli.scoring.records import ScoredRun as ScoredRun
-    from excite_cli.scoring.replayed import Replay as Replay
     from excite_cli.scoring.thresholds import Thresholds as Thresholds
     from excite_cli.shown.note import Level as Level
     from excite_cli.shown.note import Note as Note
@@ -152,8 +152,7 @@ _HOMES = {
     "measurement.dataset": ("Dataset", "Run"),
     "proposal.propose": ("Proposal",),
     "scoring.changes": ("Change", "Changes"),
-    "scoring.records": ("Score", "ScoredRun"),
-    "scoring.replayed": ("Replay",),
+    "scoring.records": ("Replay", "Score", "ScoredRun"),
     "scoring.thresholds": ("Thresholds",),
     "shown.note": ("Level", "Note"),
     "simulation.settings": ("SimulationSettings",),

@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from excite_cli.api.loading import Case
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
+from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.robot.model import Array, Robot
 

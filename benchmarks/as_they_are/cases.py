@@ -18,9 +18,8 @@ from benchmarks.as_they_are.friction import Curve
 from excite_cli.api.loading import Case as Robotic
 from excite_cli.api.loading import load_case
 from excite_cli.robot.model import Array, Robot
-from excite_cli.simulation.engine import load_mujoco
-from excite_cli.simulation.mujoco_model import Plant, build_plant
-from excite_cli.simulation.true_robot import true_inertias
+from excite_cli.simulation.build import true_inertias
+from excite_cli.simulation.mujoco_model import Plant, build_plant, load_mujoco
 
 DATA = Path(__file__).parents[2] / "data"
 ROBOTS = (

@@ -31,11 +31,10 @@ from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.spec import Spec
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
-from excite_cli.simulation.declared import sized
+from excite_cli.simulation.build import true_inertias
 from excite_cli.simulation.planned_motion import Planned
-from excite_cli.simulation.planted import Planted
+from excite_cli.simulation.planted import Planted, sized
 from excite_cli.simulation.settings import SimulationSettings
-from excite_cli.simulation.true_robot import true_inertias
 
 _CLEAN_DECK = ("clean_white", "clean_colored", "clean_centers")
 CLEAN = (*_CLEAN_DECK, "clean_columns")

@@ -11,8 +11,7 @@ from benchmarks.peers.figaroh_races import ACCELERATION, JOINTS, LIMITS
 from benchmarks.peers.race import Race, States
 from excite_cli import load_problem
 from excite_cli.constraints.base import Array
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
-from excite_cli.dynamics.regressor import Regressor
+from excite_cli.dynamics.regressor import InverseDynamics, Regressor
 from excite_cli.excitation.admissible import smallest_margins
 from excite_cli.excitation.invariant import invariants
 from excite_cli.excitation.problem import Problem

@@ -30,7 +30,7 @@ from excite_cli import (
     save_fit,
     simulate,
 )
-from excite_cli.api.report_files import read_files
+from excite_cli.api.report_figures import read_files
 from excite_cli.excitation.result import Result
 from excite_cli.store.result_file import read_samples, write_result
 

@@ -18,7 +18,7 @@ _LEFT = re.compile(r"\.meshes-[01]+\.npz\.(lock|[a-z0-9_]{8}\.part)")
 def kill_caches(folder: Path, kills: int, seed: int) -> Tally:
     """Kill `kills` processes that write both caches in turn; what is read is whole or nothing."""
     from excite_cli.disk_cache import store_arrays, stored_arrays
-    from excite_cli.geometry.capsule_cache import store_capsules, stored_capsules
+    from excite_cli.geometry.capsules import store_capsules, stored_capsules
     from excite_cli.robot.capsule import Capsule
 
     rng, tally = np.random.default_rng(seed), Tally()

@@ -21,13 +21,12 @@ from excite_cli.api.simulating import simulate
 from excite_cli.atomic import write_text_atomically
 from excite_cli.campaign.command import Command as Command
 from excite_cli.campaign.ending import ended, still_open
-from excite_cli.campaign.folder import STATE, read_campaign, write_campaign
 from excite_cli.campaign.inbox import Inbox as Inbox
 from excite_cli.campaign.measure import Measure as Measure
 from excite_cli.campaign.measure import Take
+from excite_cli.campaign.records import STATE, Learned, Round, read_campaign, write_campaign
 from excite_cli.campaign.records import Asked as Asked
 from excite_cli.campaign.records import Campaign as Campaign
-from excite_cli.campaign.records import Learned, Round
 from excite_cli.claim import claim, leave
 from excite_cli.config.load import parse_spec, spec_as_yaml
 from excite_cli.config.spec import Spec
@@ -37,7 +36,7 @@ from excite_cli.report.page import render
 from excite_cli.report.rounds_page import rounds_page
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.simulation.settings import SimulationSettings
-from excite_cli.store.versions import versions
+from excite_cli.store.own_file import versions
 from excite_cli.summary.campaign import campaign_answer as campaign_answer
 from excite_cli.summary.campaign import round_in_words
 from excite_cli.summary.named_effects import what_and_where

@@ -5,14 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
-from excite_cli.api.outputs import held
-from excite_cli.api.paths import page_path
+from excite_cli.api.outputs import held, page_path
 from excite_cli.atomic import write_text_atomically
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.report.page import render
 from excite_cli.report.trend_page import trend_page
-from excite_cli.scoring.changes import Changes, Snapshot, changes_of
-from excite_cli.scoring.snapshots import of_diagnosis, of_fit, of_score
+from excite_cli.scoring.changes import Changes, Snapshot, changes_of, of_diagnosis, of_fit, of_score
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis
 from excite_cli.store.fit_file import is_fit, read_fit
 from excite_cli.store.score_file import is_score, read_score

@@ -11,7 +11,7 @@ from excite_cli.api.planning import plan
 from excite_cli.config.load import parse_spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.comparison import Comparison
-from excite_cli.excitation.doubt import Doubt
+from excite_cli.excitation.motion import Doubt
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import random_baseline
 from excite_cli.excitation.result import Result, matches

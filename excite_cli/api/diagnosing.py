@@ -27,7 +27,7 @@ from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.diagnosis_file import write_diagnosis
-from excite_cli.store.versions import versions
+from excite_cli.store.own_file import versions
 from excite_cli.summary.diagnosis import diagnosis_answer as diagnosis_answer
 from excite_cli.workers.at_hand import at_hand
 from excite_cli.workers.base import Workers

@@ -11,7 +11,7 @@ from excite_cli.config.load import parse_spec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.catalogue import build_constraints
 from excite_cli.errors import ExciteError, FileError
-from excite_cli.excitation.doubt import Doubt
+from excite_cli.excitation.motion import Doubt
 from excite_cli.excitation.problem import build_problem
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.time_scaling import PaceLimits, slowed_chain
@@ -19,7 +19,7 @@ from excite_cli.export.own_samples import require_own_samples
 from excite_cli.export.timed import repeated
 from excite_cli.measurement.motion_files import read_own_motion
 from excite_cli.robot.model import build_robot
-from excite_cli.shown.command import Command, as_word
+from excite_cli.shown.answer import Command, as_word
 from excite_cli.shown.note import Level, Note, Tell
 from excite_cli.store.fit_knowledge import fit_knowledge
 from excite_cli.store.result_file import read_result, read_samples

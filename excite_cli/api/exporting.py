@@ -9,10 +9,9 @@ from excite_cli.api.arguments import checked
 from excite_cli.api.entering import Start, durations_of
 from excite_cli.api.exported_chains import ExportedChain, Wanted, chains_of
 from excite_cli.api.models import for_simulators, write_exported, write_model, write_models
-from excite_cli.api.outputs import held
-from excite_cli.api.paths import existing, paths_in
+from excite_cli.api.outputs import existing, held, paths_in
 from excite_cli.claim import claim, leave
-from excite_cli.config.inputs import files_of_config
+from excite_cli.config.load import files_of_config
 from excite_cli.errors import ConfigError, FileError, nearest
 from excite_cli.export.c_model import c_model
 from excite_cli.export.motion_exporter import MotionExporter
@@ -20,8 +19,7 @@ from excite_cli.export.motion_rosbag2 import is_bag
 from excite_cli.export.motions import MOTION_EXPORTERS
 from excite_cli.export.timed import timed_motion
 from excite_cli.given_files import refuse_inputs_as_outputs
-from excite_cli.shown.answer import Answer
-from excite_cli.shown.command import Command, as_word
+from excite_cli.shown.answer import Answer, Command, as_word
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.diagnosis_file import is_diagnosis
 from excite_cli.store.fit_file import is_fit, read_fit

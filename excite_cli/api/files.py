@@ -11,7 +11,7 @@ from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result, matches
 from excite_cli.given_files import refuse_inputs_as_outputs
-from excite_cli.identification.stored_fit import StoredFit
+from excite_cli.identification.stored_model import StoredFit
 from excite_cli.measurement import hdf5_writer
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.store import diagnosis_file, fit_file, result_file

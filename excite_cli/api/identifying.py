@@ -24,7 +24,7 @@ from excite_cli.identification.identify import Identification
 from excite_cli.identification.identify import identify as identify_dataset
 from excite_cli.identification.load import LoadIdentification
 from excite_cli.identification.load import identify_load as load_on
-from excite_cli.identification.stored_fit import StoredFit
+from excite_cli.identification.stored_model import StoredFit
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.fit_file import read_fit, write_fit

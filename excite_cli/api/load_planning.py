@@ -17,7 +17,7 @@ from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.identification.load import ExpectedLoad, expected_load, require_same
-from excite_cli.identification.stored_fit import StoredFit
+from excite_cli.identification.stored_model import StoredFit
 from excite_cli.robot.link_frame import carrying_frame
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.shown.record import Shown, show

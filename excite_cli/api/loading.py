@@ -9,29 +9,27 @@ from typing import Any
 import numpy as np
 
 from excite_cli.api.arguments import checked
-from excite_cli.api.paths import paths_in, refuse_twice
+from excite_cli.api.outputs import paths_in, refuse_twice
 from excite_cli.base_link.rows import with_base
 from excite_cli.checks.bodies import bodies_in_words
-from excite_cli.config.inputs import files_of_config
-from excite_cli.config.load import load_spec, spec_of
+from excite_cli.config.load import files_of_config, load_spec, spec_of
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
+from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.covariates import with_declared
-from excite_cli.measurement.dataset import Dataset, Finding
-from excite_cli.measurement.merged_findings import merged
+from excite_cli.measurement.dataset import Dataset, Finding, merged
 from excite_cli.measurement.motors import motors_of
 from excite_cli.measurement.quality import raise_for_errors
-from excite_cli.robot.described import describe
+from excite_cli.robot.glance import describe
 from excite_cli.robot.model import Robot, build_measured_robot, build_robot
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.shown.record import Shown, show
 from excite_cli.store.fit_file import read_fit
 from excite_cli.store.fit_knowledge import fit_knowledge
-from excite_cli.summary.dataset import runs_in_words
+from excite_cli.summary.inspection import runs_in_words
 from excite_cli.summary.problem import problem_notes
 from excite_cli.summary.robots import robot_parts
 

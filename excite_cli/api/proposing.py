@@ -9,8 +9,7 @@ from excite_cli.api.arguments import checked
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_text_atomically
 from excite_cli.errors import ConfigError
-from excite_cli.proposal.joints import choose_joints
-from excite_cli.proposal.limbs import limbs
+from excite_cli.proposal.joints import choose_joints, limbs
 from excite_cli.proposal.propose import Proposal, Request
 from excite_cli.proposal.propose import propose as propose_config
 from excite_cli.robot.allowed_files import Needed as Needed
@@ -22,7 +21,7 @@ from excite_cli.robot.package_search import allow_nothing, load_with_folders
 from excite_cli.robot.urdf_joints import survey
 from excite_cli.shown.answer import Answer
 from excite_cli.shown.note import Level, Note, Tell, log_note
-from excite_cli.summary.proposal import proposal_answer
+from excite_cli.summary.problem import proposal_answer
 
 Base = Literal["fixed", "floating"]
 _FARTHEST = 3  # folders upwards, for which a path is still told as a relative one

@@ -20,11 +20,11 @@ from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.robot.model import Array, Robot
-from excite_cli.scoring.replayed import Replay
+from excite_cli.scoring.records import Replay
 from excite_cli.scoring.score import Scorer
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.simulation.replay import Played, drift, inertias
-from excite_cli.summary.replay import replay_answer as replay_answer
+from excite_cli.summary.simulation import replay_answer as replay_answer
 
 _POSTURES = 40
 

@@ -20,13 +20,13 @@ from excite_cli.measurement.hdf5_writer import write_dataset
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.simulation.base_sensors import Instruments
 from excite_cli.simulation.covariate_series import parse_series as parse_series
-from excite_cli.simulation.engine import load_mujoco
+from excite_cli.simulation.mujoco_model import load_mujoco
 from excite_cli.simulation.planned_motion import Planned, PlannedMotion, PlannedProgram
 from excite_cli.simulation.planted import parse_planted
 from excite_cli.simulation.settings import SimulationSettings as SimulationSettings
 from excite_cli.simulation.simulate import Simulation, takes_of
 from excite_cli.simulation.simulate import simulate as simulate_motions
-from excite_cli.store.versions import versions
+from excite_cli.store.own_file import versions
 from excite_cli.summary.simulation import simulation_answer as simulation_answer
 from excite_cli.trajectory.chain import Segment
 

@@ -8,12 +8,10 @@ from excite_cli.api.diagnosing import diagnose
 from excite_cli.api.identifying import identify, save_fit
 from excite_cli.api.loading import load_case, load_data, load_problem
 from excite_cli.api.planning import plan
-from excite_cli.config.inputs import files_of_config
-from excite_cli.config.load import load_spec
+from excite_cli.config.load import files_of_config, load_spec
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.errors import ConfigError
-from excite_cli.excitation.progress import Progress
-from excite_cli.excitation.words import figure_in_words
+from excite_cli.excitation.progress import Progress, figure_in_words
 from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.shown.note import Note
 from excite_cli.study.case import (

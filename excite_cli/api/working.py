@@ -1,10 +1,20 @@
 """Workers, and what is worth saying about them."""
 
 import os
+from contextlib import AbstractContextManager
 
 from excite_cli.shown.note import Level, Note, Tell, saying
 from excite_cli.workers.base import Workers
 from excite_cli.workers.catalogue import open_workers
+
+# How many threads the linear algebra library takes.
+
+
+def single_threaded(threads: int = 1) -> AbstractContextManager[object]:
+    """Limit the linear algebra library: its matrices here are too small for many threads."""
+    from threadpoolctl import threadpool_limits
+
+    return threadpool_limits(limits=threads)
 
 
 def working(workers: int, scheduler: str | None, threads: int, tell: Tell) -> Workers:

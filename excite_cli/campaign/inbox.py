@@ -4,8 +4,11 @@ A log is taken that is newer than its motion, is written no more, and is a whole
 Any other stays where it is; the reason is said, and it is looked at again once it changes.
 """
 
+import fcntl
 import json
+import os
 import shutil
+import signal
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -13,11 +16,34 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from excite_cli.atomic import write_atomically, write_text_atomically
-from excite_cli.campaign.being_written import is_being_written
 from excite_cli.campaign.measure import Measure, Take
 from excite_cli.campaign.measured_log import digest_of, record_measured
 from excite_cli.claim import claim, leave
 from excite_cli.errors import refusal
+
+# Whether somebody is still writing a file.
+
+
+def is_being_written(path: Path) -> bool:
+    """Whether a process of this machine has `path` open for writing, however long it pauses.
+
+    Linux gives a read lease of a file only where nothing has it open for writing; the lease is
+    given back at once. False where nothing can be said: other systems, other machines that write
+    through a network file system, files of other users.
+    """
+    with suppress(OSError, AttributeError):
+        handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+        try:
+            # Should somebody open it just then, the signal is one that does nothing.
+            fcntl.fcntl(handle, fcntl.F_SETSIG, signal.SIGURG)
+            fcntl.fcntl(handle, fcntl.F_SETLEASE, fcntl.F_RDLCK)
+            fcntl.fcntl(handle, fcntl.F_SETLEASE, fcntl.F_UNLCK)
+        except BlockingIOError:
+            return True
+        finally:
+            os.close(handle)
+    return False
+
 
 _POLL = 0.5  # s
 _STILL = 5.0  # s that a file's size and time have not changed: a copy pauses for less

@@ -13,12 +13,11 @@ from math import inf
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from excite_cli.campaign.escalation import Escalation
 from excite_cli.campaign.held_signals import Held
 from excite_cli.campaign.one_at_a_time import left_in, session_of
-from excite_cli.campaign.processes import MARK, in_words
+from excite_cli.campaign.processes import MARK, Escalation, in_words
 from excite_cli.campaign.supervisor import Ended, Job
-from excite_cli.robot.apart import command
+from excite_cli.robot.confinement import command
 
 _POLL = 0.1  # s
 _SILENT = 5.0  # s beyond what an end takes, after which the supervisor counts as lost

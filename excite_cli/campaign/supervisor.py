@@ -26,9 +26,9 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from excite_cli.campaign.escalation import Escalation
 from excite_cli.campaign.measured_log import record_measured
 from excite_cli.campaign.processes import (
+    Escalation,
     Process,
     adopt_orphans,
     boot,

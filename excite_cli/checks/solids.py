@@ -15,15 +15,38 @@ densities are 220 to 5,800 kg/m³ for 90 % of the links, 15,000 at most but for 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from excite_cli.checks.link_bodies import LinkBody, link_bodies
+from excite_cli.checks.bodies import LinkBody, link_bodies
 from excite_cli.checks.result import Result, few
-from excite_cli.geometry.link_corners import link_corners
+from excite_cli.errors import RobotError
+from excite_cli.geometry.link_shapes import collision_model, placed_shapes, visual_model
+from excite_cli.robot.mesh_paths import unusable, without_unusable
 from excite_cli.robot.model import Array, Robot, links_by_joint
+
+# Corners of all shapes of every link, collision and visual ones, in the frame of the link.
+
+
+def link_corners(robot: Robot) -> dict[str, Array]:
+    """Corners (N, 3) [m] by the link's name; none of meshes that are missing or cannot be read."""
+    described = robot.description
+    lacking = {**unusable(described, "collision"), **unusable(described, "visual")}
+    usable = replace(robot, description=without_unusable(described, tuple(lacking)))
+    found: dict[str, list[Array]] = {}
+    for of_kind in (collision_model, visual_model):
+        try:
+            geometry = of_kind(usable)
+            for item, link, points in placed_shapes(usable, geometry):
+                frame = robot.model.frames[item.parentFrame].placement
+                own = (points - np.array(frame.translation)) @ np.array(frame.rotation)
+                found.setdefault(link, []).append(own)
+        except RobotError:  # a shape of another kind: what was read so far counts
+            continue
+    return {link: np.vstack(points) for link, points in found.items()}
+
 
 NAME = "masses and shapes of links"
 _DENSEST = 20_000.0  # kg/m³, above tungsten; links of real robots end at 15,000

@@ -9,7 +9,7 @@ import re
 
 import numpy as np
 
-from excite_cli.checks.link_bodies import LinkBody, link_bodies
+from excite_cli.checks.bodies import LinkBody, link_bodies
 from excite_cli.checks.result import Result, few
 from excite_cli.robot.model import Robot
 

@@ -146,8 +146,7 @@ def campaign(
     """
     from excite_cli.api.campaigning import MODEL, PAGE, Asked, campaign_answer, run_campaign
     from excite_cli.api.loading import load_case
-    from excite_cli.api.threads import single_threaded
-    from excite_cli.api.working import working
+    from excite_cli.api.working import single_threaded, working
     from excite_cli.cli.measured_by import measured_by
     from excite_cli.cli.start_line import start_line
 

@@ -56,7 +56,7 @@ def compare(
     """
     from excite_cli.api.changes import changes_answer
     from excite_cli.api.changes import compare as compare_files
-    from excite_cli.api.threads import single_threaded
+    from excite_cli.api.working import single_threaded
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     with single_threaded():

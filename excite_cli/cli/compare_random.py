@@ -64,8 +64,7 @@ def compare_random(
     from excite_cli.api.loading import load_problem
     from excite_cli.api.outputs import held
     from excite_cli.api.planning import plan
-    from excite_cli.api.threads import single_threaded
-    from excite_cli.api.working import working
+    from excite_cli.api.working import single_threaded, working
     from excite_cli.cli.start_line import iterations_of, start_line
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)

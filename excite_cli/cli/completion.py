@@ -31,13 +31,13 @@ def complete_key(incomplete: str) -> list[str]:
 
 
 def _robots() -> list[str]:
-    from excite_cli.api.offered import robot_names
+    from excite_cli.api.schema import robot_names
 
     return robot_names()
 
 
 def _kinds() -> list[str]:
-    from excite_cli.api.offered import effect_kinds
+    from excite_cli.api.schema import effect_kinds
 
     return effect_kinds()
 

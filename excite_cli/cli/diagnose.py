@@ -72,9 +72,8 @@ def diagnose(
     from excite_cli.api.diagnosing import diagnose as diagnose_data
     from excite_cli.api.diagnosing import diagnosis_answer
     from excite_cli.api.loading import load_case
-    from excite_cli.api.threads import single_threaded
-    from excite_cli.api.working import working
-    from excite_cli.cli.answer_so_far import answer_so_far
+    from excite_cli.api.working import single_threaded, working
+    from excite_cli.cli.stopping import answer_so_far
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     with (

@@ -9,7 +9,7 @@ from excite_cli.cli import options
 from excite_cli.cli.completion import complete_format
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
-from excite_cli.cli.posture import start_from
+from excite_cli.cli.options import start_from
 from excite_cli.errors import ConfigError
 
 
@@ -110,7 +110,7 @@ def export(
       excite export diagnosis.h5 --format c -o arm.c
     """
     from excite_cli.api.exporting import export_answer, export_file
-    from excite_cli.api.threads import single_threaded
+    from excite_cli.api.working import single_threaded
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     with single_threaded():

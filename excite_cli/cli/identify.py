@@ -77,8 +77,7 @@ def identify(
     from excite_cli.api.identifying import identification_answer, identify_load, load_answer
     from excite_cli.api.identifying import identify as identify_data
     from excite_cli.api.loading import load_case
-    from excite_cli.api.threads import single_threaded
-    from excite_cli.api.working import working
+    from excite_cli.api.working import single_threaded, working
     from excite_cli.errors import ConfigError
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)

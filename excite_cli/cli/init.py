@@ -78,7 +78,7 @@ def init(
     Example:  excite init --robot ur10 --set sequence.motions=5
     """
     from excite_cli.api.proposing import EXAMPLE_PREFIX, is_named, limbs_of, save_proposal
-    from excite_cli.api.threads import single_threaded
+    from excite_cli.api.working import single_threaded
     from excite_cli.cli.init_questions import Answers, ask, may_read
     from excite_cli.errors import ConfigError
 

@@ -57,7 +57,7 @@ def inspect(
     from excite_cli.api.inspecting import inspect as inspect_data
     from excite_cli.api.inspecting import inspection_answer
     from excite_cli.api.loading import load_case
-    from excite_cli.api.threads import single_threaded
+    from excite_cli.api.working import single_threaded
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     files = data or []

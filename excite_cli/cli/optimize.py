@@ -105,8 +105,7 @@ def optimize(
     from excite_cli.api.loading import load_case, load_problem
     from excite_cli.api.outputs import held_result, result_path
     from excite_cli.api.planning import Planned, plan, plan_after, plan_answer
-    from excite_cli.api.threads import single_threaded
-    from excite_cli.api.working import working
+    from excite_cli.api.working import single_threaded, working
     from excite_cli.cli.start_line import iterations_of, start_line
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)

@@ -33,7 +33,7 @@ def replay(
     """
     from excite_cli.api.replaying import replay as replay_data
     from excite_cli.api.replaying import replay_answer
-    from excite_cli.api.threads import single_threaded
+    from excite_cli.api.working import single_threaded
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     with single_threaded():

@@ -78,7 +78,7 @@ def report(
       excite report ur10.h5 diagnosis.h5 --figures ur10-figures --format svg
     """
     from excite_cli.api.reporting import report_answer, write_report
-    from excite_cli.api.threads import single_threaded
+    from excite_cli.api.working import single_threaded
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     with single_threaded(), terminal.live("drawing") as line:

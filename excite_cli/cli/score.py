@@ -59,8 +59,7 @@ def score(
     """
     from excite_cli.api.scoring import score as score_data
     from excite_cli.api.scoring import score_answer, thresholds
-    from excite_cli.api.threads import single_threaded
-    from excite_cli.api.working import working
+    from excite_cli.api.working import single_threaded, working
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     with (

@@ -9,7 +9,7 @@ from excite_cli.cli import options
 from excite_cli.cli.completion import complete_effect
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
-from excite_cli.cli.posture import start_from
+from excite_cli.cli.options import start_from
 
 _PLAYED, _ROBOT, _MEASURED = "Playback", "Simulated robot", "Recording"
 
@@ -191,7 +191,7 @@ def simulate(
     from excite_cli.api.loading import load_case
     from excite_cli.api.simulating import SimulationSettings, parse_series, simulation_answer
     from excite_cli.api.simulating import simulate as simulate_motions
-    from excite_cli.api.threads import single_threaded
+    from excite_cli.api.working import single_threaded
     from excite_cli.cli.base_noise import base_noise
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)

@@ -68,8 +68,7 @@ def study(
         --vary identification.method=ols,wls
     """
     from excite_cli.api.studying import StudyNews, run_study, study_answer, study_folder
-    from excite_cli.api.threads import single_threaded
-    from excite_cli.api.working import working
+    from excite_cli.api.working import single_threaded, working
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     with (

@@ -24,9 +24,9 @@ def verify_gradient(
       excite verify-gradient ur10.yaml
     """
     from excite_cli.api.loading import load_problem
-    from excite_cli.api.threads import single_threaded
     from excite_cli.api.verifying import gradient_answer
     from excite_cli.api.verifying import verify_gradient as verify
+    from excite_cli.api.working import single_threaded
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     changes = [*(overrides or []), "constraints.self_collision=null"]

@@ -106,9 +106,8 @@ def view(
     Example:  excite view ur10.h5 --motion 2 --gif ur10.gif --duration 6
     """
     from excite_cli.api.showing import Answer
-    from excite_cli.api.threads import single_threaded
     from excite_cli.api.viewing import Serving, View, draw_motion, drawing_answer, view_motions
-    from excite_cli.api.working import working
+    from excite_cli.api.working import single_threaded, working
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     target = _target(png, gif)

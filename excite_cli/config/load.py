@@ -4,7 +4,7 @@ Errors name the key's path, what is allowed and the nearest known key.
 """
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 import yaml
@@ -12,12 +12,103 @@ from pydantic import ValidationError
 
 from excite_cli.config.explain import Path as Place
 from excite_cli.config.explain import explain
-from excite_cli.config.lines import line_at
 from excite_cli.config.spec import Spec
-from excite_cli.config.strict_yaml import load_strict
-from excite_cli.config.values import plain_values
+from excite_cli.config.strict_yaml import composed, load_strict
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.given_files import require_stored
+
+# Plain values of a config that was put together in Python: what YAML could have said.
+
+_DEEPEST = 50
+_PLAIN = (str, int, float, bool, type(None))
+
+
+def plain_values(given: Mapping[Any, Any], source: str) -> dict[str, Any]:
+    """A copy in dicts, lists, texts and numbers; arrays become lists, paths texts.
+
+    Raises
+    ------
+    ConfigError
+        Something is none of these; the message names `source` and the key.
+    """
+    return {_key(key, source, ""): _plain(each, source, f"{key}") for key, each in given.items()}
+
+
+def _plain(value: Any, source: str, place: str) -> Any:
+    if place.count(".") >= _DEEPEST:
+        raise ConfigError(f"{source}: {place[:100]}… is nested too deeply, or holds itself.")
+    if isinstance(value, Mapping):
+        return {
+            _key(key, source, place): _plain(each, source, f"{place}.{key}")
+            for key, each in value.items()
+        }
+    if hasattr(value, "tolist"):  # an array or a number of NumPy, which is not imported for that
+        return _plain(value.tolist(), source, place)
+    if isinstance(value, list | tuple):
+        return [_plain(each, source, f"{place}.{k}") for k, each in enumerate(value)]
+    if isinstance(value, PurePath):
+        return str(value)
+    if isinstance(value, _PLAIN):
+        return value
+    raise ConfigError(
+        f"{source}: {place} is of type {type(value).__name__}. Allowed are what a YAML file holds: "
+        "texts, numbers, true and false, None, lists and dicts of them."
+    )
+
+
+def _key(key: Any, source: str, place: str) -> str:
+    if isinstance(key, str):
+        return key
+    where = f"{place}: " if place else ""
+    raise ConfigError(f"{source}: {where}the key {key!r} is no text. Give names of settings.")
+
+
+# On which line of a YAML text a key stands, for messages.
+
+
+def line_at(text: str, path: tuple[Any, ...]) -> int | None:
+    """The line, from 1, of the key or list item at `path`; None if the text does not have it.
+
+    A path whose last key is missing (a required one) gives the line of its section.
+    """
+    try:
+        node = composed(text)
+    except (yaml.YAMLError, ValueError, RecursionError):
+        return None
+    line: int | None = None
+    for depth, part in enumerate(path):
+        found = _child(node, part)
+        if found is None:
+            return line if depth == len(path) - 1 else None
+        line, node = found
+    return line
+
+
+def _child(node: Any, part: Any) -> tuple[int, Any] | None:
+    """Line and node of what stands under `part`."""
+    if isinstance(node, yaml.MappingNode):
+        for key, value in node.value:
+            if key.value == str(part):
+                return key.start_mark.line + 1, value
+    if isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
+        return node.value[part].start_mark.line + 1, node.value[part]
+    return None
+
+
+# The files that a config stands for: itself, and those that it names.
+
+
+def files_of_config(spec: Spec, folder: Path, config: Path | None) -> tuple[Path, ...]:
+    """The config (if it is a file), its URDF and the fit of `uncertainty.fit`, there or not.
+
+    Relative paths start from `folder`.
+    """
+    named = [spec.robot.urdf]
+    if spec.uncertainty is not None and spec.uncertainty.fit is not None:
+        named.append(spec.uncertainty.fit)
+    own = () if config is None else (config,)
+    return (*own, *(folder / name for name in named))
+
 
 MAX_BYTES = 1_000_000
 # What is given by mistake for a config, by its suffix.

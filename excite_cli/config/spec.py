@@ -16,12 +16,89 @@ from excite_cli.config.data_spec import (
     MeasurementSpec,
     RunStates,
 )
-from excite_cli.config.identified_spec import IdentifiedSpec
 from excite_cli.config.robot_spec import RobotSpec
-from excite_cli.config.section import Integer, Motions, Positive, Power, Section, Share
+from excite_cli.config.section import (
+    Finite,
+    Integer,
+    Motions,
+    NonNegative,
+    Positive,
+    Power,
+    Section,
+    Share,
+)
 from excite_cli.config.trajectory_spec import FourierSpec, SamplingSpec, TrajectorySpec
-from excite_cli.config.uncertainty_spec import UncertaintySpec
 from excite_cli.shown.record import Shown
+
+# What a YAML file may say about how well the inertias are known before identification.
+
+
+class BodyUncertaintySpec(Section):
+    """Bounds on mass, centre of mass and inertia of a body, around those of the URDF.
+
+    The mass is m₀(1 ± mass), the centre c₀ ± center_of_mass along each axis, and the inertia about
+    the centre of mass I_kl ± inertia·(I_kk + I_ll)/2. All such bodies are within the box of the ten
+    parameters about the joint frame for which limits are kept.
+    """
+
+    mass: NonNegative = Field(0.1, description="share of the mass")
+    center_of_mass: NonNegative = Field(0.01, description="[m] along each axis")
+    inertia: NonNegative = Field(
+        0.1, description="share of the moments of inertia about the centre"
+    )
+
+
+class UncertaintySpec(BodyUncertaintySpec):
+    """Torque, balance and contact hold for every inertia within these bounds."""
+
+    bodies: dict[str, BodyUncertaintySpec] = Field(
+        default_factory=dict, description="other bounds for bodies, by the joint that moves them"
+    )
+    fit: str | None = Field(
+        None,
+        description="fit file of `excite identify`: its covariance bounds what it identified",
+    )
+    sigmas: Positive = Field(3.0, description="half axes of its ellipsoid, in standard deviations")
+
+
+# What a YAML file may say of numbers that were identified: the model that `excite score` plays.
+
+
+class IdentifiedEffectSpec(Section):
+    """An effect with its values."""
+
+    kind: str = Field(description="one of the effects")
+    joints: tuple[str, ...] = Field(description="names of the joints that it acts on")
+    shape: dict[str, Finite] = Field(
+        default_factory=dict, description="values of its non-linear parameters"
+    )
+    runs: tuple[str, ...] = Field((), description="runs that had it; empty: it is always there")
+    covariate: str = Field("", description="the column of the log that it follows, if any")
+    values: tuple[Finite, ...] = Field(description="its linear parameters in order")
+
+
+class IdentifiedSpec(Section):
+    """A model with its numbers, as `excite diagnose --apply` writes it; a fit looks at none."""
+
+    gone: ClassVar = {"sealed_run": ((None, ""), "is called held_out_run since version 0.3")}
+
+    inertias: dict[str, Finite] = Field(
+        description="ten parameters of every body about its joint's frame, as m[elbow]"
+    )
+    effects: tuple[IdentifiedEffectSpec, ...] = Field((), description="effects with their values")
+    held_out_run: str = Field("", description="the run whose errors these are")
+    error: dict[str, dict[str, float | None]] = Field(
+        default_factory=dict,
+        description="errors when it was made, by figure (relative, relative_moving, rms, "
+        "rms_moving) and joint",
+    )
+    noise: dict[str, Finite] = Field(
+        default_factory=dict, description="noise of the filtered torque by joint, where known"
+    )
+    processing: dict[str, float | str | None] = Field(
+        default_factory=dict, description="the filters that these errors belong to"
+    )
+
 
 CriterionKind = Literal[
     "condition_number",

@@ -14,13 +14,12 @@ from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.constraints.drawing import Drawing, GroundRegion
 from excite_cli.constraints.support_polygon import Support, support_polygon
 from excite_cli.dynamics.center_of_mass import CenterOfMass
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.dynamics.least_ratio import Ratios, least_ratios, worst_inertias
-from excite_cli.dynamics.states import States
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
 from excite_cli.dynamics.whole_robot import drawn_states
-from excite_cli.proof.enclosed_least import least_of
 from excite_cli.proof.enclosed_motion import EnclosedMotion
-from excite_cli.proof.enclosed_rows import combined, mass_rows
+from excite_cli.proof.enclosed_rows import combined, least_of, mass_rows
 from excite_cli.robot.model import Robot
 
 DISC_SIDES = 16

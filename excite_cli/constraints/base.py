@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from excite_cli.constraints.drawing import Drawing, Nearest
 from excite_cli.constraints.joint_columns import JointColumns
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.geometry.reasons import DroppedPair
+from excite_cli.proof.certificate import Worst
 from excite_cli.proof.enclosed_motion import EnclosedMotion
-from excite_cli.proof.worst_margin import Worst
 from excite_cli.robot.capsule import Capsule
 from excite_cli.shown.note import Note
 

@@ -32,8 +32,7 @@ from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.constraints.standing import Standing
 from excite_cli.constraints.support_polygon import support_polygon
 from excite_cli.dynamics.center_of_mass import CenterOfMass
-from excite_cli.dynamics.forward_kinematics import BatchKinematics
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.geometry.capsules import fit_capsules

@@ -20,14 +20,13 @@ import numpy as np
 from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.constraints.drawing import Drawing, GroundRegion
 from excite_cli.constraints.support_polygon import Support
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.dynamics.least_ratio import Ratios, least_ratios, least_values, worst_inertias
 from excite_cli.dynamics.row_adjoint import RowAdjoint
-from excite_cli.dynamics.states import States
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
 from excite_cli.dynamics.whole_robot import GroundWrench, drawn_states, whole_parameters
-from excite_cli.proof.enclosed_least import least_of
 from excite_cli.proof.enclosed_motion import EnclosedMotion
-from excite_cli.proof.enclosed_rows import combined, ground_rows
+from excite_cli.proof.enclosed_rows import combined, ground_rows, least_of
 from excite_cli.robot.model import Robot
 
 # Below this share of the weight a load has no zero-moment point to speak of.

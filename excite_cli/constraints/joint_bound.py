@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.constraints.joint_columns import JointColumns, Quantity
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.robot.model import Robot
 

@@ -11,15 +11,13 @@ import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.constraints.joint_columns import JointColumns, Quantity
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
-from excite_cli.dynamics.regressor import Regressor
+from excite_cli.dynamics.forward_kinematics import States
+from excite_cli.dynamics.regressor import InverseDynamics, Regressor
 from excite_cli.dynamics.row_adjoint import RowAdjoint
-from excite_cli.dynamics.states import States
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
 from excite_cli.dynamics.whole_robot import drawn_states
-from excite_cli.proof.enclosed_least import least_of
 from excite_cli.proof.enclosed_motion import EnclosedMotion
-from excite_cli.proof.enclosed_rows import torque_rows
+from excite_cli.proof.enclosed_rows import least_of, torque_rows
 from excite_cli.robot.model import Robot
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.robot.model import Robot

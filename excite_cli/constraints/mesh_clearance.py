@@ -3,7 +3,7 @@
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.geometry.pair_table import PairTable
 from excite_cli.geometry.pair_tables import FAR
 from excite_cli.geometry.reasons import DroppedPair

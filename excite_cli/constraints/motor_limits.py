@@ -9,15 +9,13 @@ from dataclasses import replace
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
-from excite_cli.dynamics.regressor import Regressor
+from excite_cli.dynamics.forward_kinematics import States
+from excite_cli.dynamics.regressor import InverseDynamics, Regressor
 from excite_cli.dynamics.row_adjoint import RowAdjoint
-from excite_cli.dynamics.states import States
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
 from excite_cli.measurement.motors import Motors
-from excite_cli.proof.enclosed_least import least_of
 from excite_cli.proof.enclosed_motion import EnclosedMotion
-from excite_cli.proof.enclosed_rows import combined, torque_rows
+from excite_cli.proof.enclosed_rows import combined, least_of, torque_rows
 from excite_cli.robot.model import Robot
 
 _ORDERS = ("position", "velocity", "acceleration")

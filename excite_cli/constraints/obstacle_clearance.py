@@ -6,14 +6,13 @@ from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.constraints.drawing import Drawing, Nearest
 from excite_cli.constraints.nearest_bodies import nearest_obstacles
 from excite_cli.constraints.remark import counted_reasons
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.geometry.coal_distances import CoalDistances
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.geometry.obstacle_distances import ObstacleDistances
 from excite_cli.geometry.obstacle_pairs import ObstaclePairs
 from excite_cli.geometry.obstacles import Box, Obstacle
-from excite_cli.geometry.reasons import DroppedPair, Why
-from excite_cli.geometry.words import reason_in_words
+from excite_cli.geometry.reasons import DroppedPair, Why, reason_in_words
 from excite_cli.proof.enclosed_distances import EnclosedCapsules
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.enclosed_obstacles import least_clearances

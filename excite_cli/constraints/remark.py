@@ -3,8 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 
-from excite_cli.geometry.reasons import DroppedPair
-from excite_cli.geometry.words import why_in_words
+from excite_cli.geometry.reasons import DroppedPair, why_in_words
 
 
 def counted_reasons(dropped: Sequence[DroppedPair]) -> str:

@@ -6,17 +6,31 @@ from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.constraints.drawing import Drawing, Nearest
 from excite_cli.constraints.nearest_bodies import nearest_capsules
 from excite_cli.constraints.remark import counted_reasons
-from excite_cli.dynamics.states import States
-from excite_cli.geometry.clearance import Clearance
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.geometry.coal_distances import CoalDistances
 from excite_cli.geometry.collision_pairs import CollisionPairs
 from excite_cli.geometry.link_meshes import Poses
+from excite_cli.geometry.pair_distances import PairDistances
 from excite_cli.geometry.reasons import DroppedPair
 from excite_cli.proof.enclosed_distances import EnclosedCapsules
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
 from excite_cli.shown.note import Level, Note
+
+# Clearance of a motion: distances of the checked pairs of capsules.
+
+
+class Clearance(PairDistances):
+    """Signed distances [m] of the checked pairs, column k being `pairs.checked[k]`.
+
+    `names` gives the two capsules of each column, for messages and reports.
+    """
+
+    def __init__(self, robot: Robot, capsules: tuple[Capsule, ...], pairs: CollisionPairs) -> None:
+        super().__init__(robot, capsules, pairs.checked)
+        self.names = tuple((capsules[i].name, capsules[j].name) for i, j in pairs.checked)
+
 
 # Distances beyond this many metres above the margin do not concern the optimiser; less for a robot
 # of thin links (this many times their radius), so that a hand need not open as far as an arm.

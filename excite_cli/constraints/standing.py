@@ -10,7 +10,7 @@ that keeps them as it is and standing still keeps them at any lower speed.
 """
 
 from excite_cli.constraints.base import Array, Constraint, Indices
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 
 

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.diagnosis.cholesky import RIDGE
+from excite_cli.diagnosis.schur import RIDGE
 from excite_cli.robot.model import Array
 
 _KEPT = 64  # models whose fits are kept

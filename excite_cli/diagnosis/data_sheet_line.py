@@ -14,10 +14,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from excite_cli.diagnosis.before_after import Played
-from excite_cli.diagnosis.declared_model import places_of
 from excite_cli.diagnosis.final_fit import FinalFit
+from excite_cli.diagnosis.held_out_errors import Played
 from excite_cli.diagnosis.held_out_verdict import worth_beside
+from excite_cli.diagnosis.modelled_run import places_of
 from excite_cli.diagnosis.records import FrictionLine, by_joint
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.effects.catalogue import straight_friction

@@ -10,26 +10,26 @@ import numpy as np
 
 from excite_cli.checks.look import findings_of
 from excite_cli.config.spec import Spec
-from excite_cli.diagnosis.absorbed import absorbed_effects
-from excite_cli.diagnosis.aliases import joint_aliases, other_name
-from excite_cli.diagnosis.before_after import Played, both_models, refitted
+from excite_cli.diagnosis.aliases import absorbed_effects, joint_aliases, other_name
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.comparison import Comparison
 from excite_cli.diagnosis.data_sheet_line import data_sheet_lines, with_worth
-from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.effect_trace import effect_traces
 from excite_cli.diagnosis.final_fit import final_fit, over_error, regression
 from excite_cli.diagnosis.held_out_errors import (
     INERTIAS,
     HeldOutErrors,
+    Played,
+    both_models,
     error_parts,
     error_path,
     held_out_errors,
+    refitted,
 )
 from excite_cli.diagnosis.held_out_verdict import Worth, worth_on_held_out
 from excite_cli.diagnosis.large_rest import large_rests
-from excite_cli.diagnosis.modelled_run import ModelledRun
+from excite_cli.diagnosis.modelled_run import Model, ModelledRun
 from excite_cli.diagnosis.naming import information_of, named_effects
 from excite_cli.diagnosis.own_torque import at_its_own_torque
 from excite_cli.diagnosis.records import (
@@ -76,8 +76,8 @@ from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.split import Split, split, with_ends_held_out
 from excite_cli.identification.torque_scale import Knowledge, assumed_scale, weighed
 from excite_cli.identification.torque_trace import torque_units
+from excite_cli.measurement.campaign_clock import recorded
 from excite_cli.measurement.dataset import Dataset, Finding, Run
-from excite_cli.measurement.recorded import recorded
 from excite_cli.robot.model import Robot
 from excite_cli.robot.skeleton import skeleton_of
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.declared_model import places_of
+from excite_cli.diagnosis.modelled_run import places_of
 from excite_cli.diagnosis.traces import EffectTrace
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.effects.base import Effect

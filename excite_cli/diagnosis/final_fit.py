@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.diagnosis.declared_model import places_of, width_of
+from excite_cli.diagnosis.modelled_run import places_of, width_of
 from excite_cli.diagnosis.tracing import Traced
 from excite_cli.dynamics.nearest_inertias import half_of
 from excite_cli.identification.factors import Mask

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from excite_cli.diagnosis import rules
-from excite_cli.diagnosis.before_after import Played, refitted
+from excite_cli.diagnosis.held_out_errors import Played, refitted
 from excite_cli.diagnosis.records import Removed
 from excite_cli.diagnosis.textbook import everyday
 from excite_cli.diagnosis.tracing import Traced

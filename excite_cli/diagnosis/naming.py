@@ -11,10 +11,10 @@ from scipy.linalg import cholesky
 
 from excite_cli.diagnosis.aliases import aliases_of
 from excite_cli.diagnosis.candidates import record_of
-from excite_cli.diagnosis.declared_model import places_of
 from excite_cli.diagnosis.doubt import explained
 from excite_cli.diagnosis.final_fit import FinalFit
 from excite_cli.diagnosis.held_out_verdict import Worth
+from excite_cli.diagnosis.modelled_run import places_of
 from excite_cli.diagnosis.records import (
     Approximation,
     EffectRecord,

@@ -26,7 +26,7 @@ from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.stack import Stack
 from excite_cli.robot.base_joints import BASE_ROWS
 from excite_cli.robot.model import Array, Robot, build_measured_robot
-from excite_cli.shown.command import Command, as_word
+from excite_cli.shown.answer import Command, as_word
 from excite_cli.shown.record import Shown
 
 

@@ -13,8 +13,8 @@ from excite_cli.effects.base import Value
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.torque_trace import TorqueTrace
+from excite_cli.measurement.campaign_clock import Recorded
 from excite_cli.measurement.dataset import Finding
-from excite_cli.measurement.recorded import Recorded
 from excite_cli.robot.model import Array
 from excite_cli.robot.skeleton import Skeleton
 from excite_cli.shown.record import Shown

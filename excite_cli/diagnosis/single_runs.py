@@ -10,9 +10,9 @@ there are measured.
 
 from collections.abc import Sequence
 
-from excite_cli.diagnosis.before_after import Played
 from excite_cli.diagnosis.candidates import record_of
-from excite_cli.diagnosis.declared_model import Model, places_of
+from excite_cli.diagnosis.held_out_errors import Played
+from excite_cli.diagnosis.modelled_run import Model, places_of
 from excite_cli.diagnosis.records import Assumption, HeldOutEnds
 from excite_cli.diagnosis.tracing import Traced, differences
 from excite_cli.diagnosis.verdict import Verdict

@@ -11,7 +11,7 @@ from itertools import product
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.comparison import Comparison
-from excite_cli.diagnosis.declared_model import Model
+from excite_cli.diagnosis.modelled_run import Model
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION, catalogue, shows
 

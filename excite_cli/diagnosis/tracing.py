@@ -16,11 +16,11 @@ import numpy as np
 
 from excite_cli.config.data_spec import DiagnosisSpec
 from excite_cli.diagnosis.candidates import Candidate, possible_effects, shapes_around, with_columns
-from excite_cli.diagnosis.declared_model import Model
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.in_runs import SeenRuns
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.modelled_run import (
+    Model,
     ModelledRun,
     inertial_columns,
     signals_of_all,
@@ -29,18 +29,16 @@ from excite_cli.diagnosis.modelled_run import (
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
 from excite_cli.diagnosis.placebo import placebos_of
 from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
-from excite_cli.diagnosis.reach import Reach
+from excite_cli.diagnosis.reach import Reach, UsualMotion
 from excite_cli.diagnosis.search import Search
 from excite_cli.diagnosis.textbook import everyday, textbook_effects
 from excite_cli.diagnosis.training import TrainingData
-from excite_cli.diagnosis.usual_motion import UsualMotion
 from excite_cli.diagnosis.weighted_fit import WeightedFit
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import scales
 from excite_cli.effects.seen import Seen
-from excite_cli.identification.declared_states import declared_sets
-from excite_cli.identification.left_out import LeftOut
+from excite_cli.identification.declared_states import LeftOut, declared_sets
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.prior import InertialPrior, as_wide_as_needed
 from excite_cli.robot.model import Array

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.evidence import Evidence
-from excite_cli.diagnosis.grams import Grams, JointGram
+from excite_cli.diagnosis.evidence import Evidence, Grams, JointGram
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.identification.covariance import Rows
 from excite_cli.identification.prepare import PreparedRun

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.diagnosis import rules
-from excite_cli.diagnosis.cholesky import RIDGE, Cholesky
 from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.diagnosis.schur import RIDGE, Cholesky
 from excite_cli.diagnosis.training import Columns, TrainingData
 from excite_cli.identification.least_squares import EXACT
 from excite_cli.robot.model import Array

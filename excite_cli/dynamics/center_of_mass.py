@@ -9,8 +9,8 @@ Mass and first moment are linear in (m, m c) of every body, which is what uncert
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.dynamics.spatial_adjoint import cross
-from excite_cli.dynamics.states import States
 from excite_cli.robot.carried import carried_bodies
 from excite_cli.robot.model import Array, Robot
 

@@ -9,6 +9,7 @@ world origin: angular R w, linear R v + p x (R w). The floating base stands at i
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -147,3 +148,23 @@ def _levels(parents: list[int]) -> list[_Level]:
         depth.append(0 if parent < 0 else depth[parent] + 1)
     groups = [[b for b, d in enumerate(depth) if d == level] for level in range(max(depth) + 1)]
     return [_Level(np.array(group), np.array([parents[b] for b in group])) for group in groups]
+
+
+@dataclass(frozen=True)
+class States:
+    """q, v, a (T, n) of the moved joints; placements and motion columns are computed once."""
+
+    kinematics: BatchKinematics
+    q: Array
+    v: Array
+    a: Array
+
+    @cached_property
+    def placements(self) -> tuple[Array, Array]:
+        """Rotations (T, B, 3, 3) and translations (T, B, 3) of all bodies in the world."""
+        return self.kinematics.placements(self.q)
+
+    @cached_property
+    def columns(self) -> Array:
+        """World motion columns (T, nv, 6), [linear; angular] about the world origin."""
+        return self.kinematics.axes(*self.placements)

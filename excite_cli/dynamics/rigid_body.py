@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
-from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, Regressor
+from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, InverseDynamics, Regressor
 from excite_cli.robot.model import Array, Robot
 
 # φ₁ of every body: 1 kg and 1 kg·m² at its frame.

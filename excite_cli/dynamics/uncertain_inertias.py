@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.config.uncertainty_spec import BodyUncertaintySpec, UncertaintySpec
+from excite_cli.config.spec import BodyUncertaintySpec, UncertaintySpec
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import Regressor
 from excite_cli.dynamics.whole_robot import (

@@ -5,10 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from excite_cli.constraints.base import Array
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.excitation.problem import Problem
-from excite_cli.proof.certificate import Path, Verdict, certify
-from excite_cli.proof.worst_margin import Worst
+from excite_cli.proof.certificate import Path, Verdict, Worst, certify
 from excite_cli.trajectory.base import Trajectory
 
 CONTROLLER_RATE = 1000.0

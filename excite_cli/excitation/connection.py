@@ -13,7 +13,7 @@ import numpy as np
 
 from excite_cli.constraints.base import Array
 from excite_cli.constraints.joint_columns import Quantity
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.admissible import CONTROLLER_RATE, path_of
 from excite_cli.excitation.base_motion import disconnected, straight_block

@@ -10,7 +10,7 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 
 from excite_cli.constraints.base import Array
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.excitation.task import MotionTask
 
 Mask = NDArray[np.bool_]

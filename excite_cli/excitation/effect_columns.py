@@ -16,8 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
-from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.regressor import InverseDynamics, standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody, robot_with
 from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint
 from excite_cli.effects.base import Cotangents, Effect, Signals

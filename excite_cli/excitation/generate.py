@@ -22,15 +22,13 @@ from excite_cli.excitation.one_start import (
     solve_start,
 )
 from excite_cli.excitation.problem import Problem
-from excite_cli.excitation.progress import ProgressCallback, Status
+from excite_cli.excitation.progress import Progress, ProgressCallback, Stage, Starts, Status
 from excite_cli.excitation.solvers.base import Solver
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import Start, moved_note
-from excite_cli.excitation.start_progress import followed
 from excite_cli.excitation.task import MotionTask
 from excite_cli.trajectory.chain import Segment
-from excite_cli.workers.base import News, Workers
-from excite_cli.workers.here import Here
+from excite_cli.workers.base import Here, News, Watch, Workers
 
 # Beyond this condition number some parameters do not show at all.
 _BLIND = 1e9
@@ -165,7 +163,7 @@ def _told_apart(
         if not going:
             return
         asked = [_task(tasks[k], last.get(k), until) for k in going]
-        follow = followed(report, search.problem, len(going))
+        follow = _followed(report, search.problem, len(going))
 
         def watch(news: News) -> None:
             if isinstance(news.result, FoundMotion):
@@ -219,3 +217,26 @@ def is_improvement(task: MotionTask, value: float) -> bool:
     if task.stack.rows == 0 or sigma[-1] <= np.finfo(float).eps * sigma[0]:
         return True
     return value < task.problem.criterion.value(sigma) - _IMPROVEMENT
+
+
+def _followed(report: ProgressCallback, problem: Problem, starts: int) -> Watch:
+    """Pass on what starts tell; where there are several, with how many of them are done."""
+    most = problem.spec.optimizer.max_iterations
+    iterations = [0] * starts
+
+    def watch(news: News) -> None:
+        told: Progress | None = news.word
+        if isinstance(news.result, FoundMotion):  # its last point keeps all limits
+            count = news.result.outcome.iterations
+            told = Progress(count, news.result.figure, 0.0, news.result.seconds, Stage())
+            iterations[news.index] = most
+        elif told is not None:
+            iterations[news.index] = min(told.iteration, most)
+        if told is None or (starts == 1 and news.result is not None):
+            return
+        if starts > 1:
+            total = sum(iterations)
+            told = replace(told, starts=Starts(news.done, news.running, starts, total))
+        report(told)
+
+    return watch

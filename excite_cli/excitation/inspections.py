@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from excite_cli.excitation.doubt import Doubt
 from excite_cli.excitation.inspection import Inspection, Look
+from excite_cli.excitation.motion import Doubt
 from excite_cli.shown.record import Shown
 
 # Stored samples may differ from the motion by rounding only.

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from excite_cli.constraints.base import Array
 from excite_cli.geometry.mesh_check import MeshCheck, MeshGap, MeshGaps
 from excite_cli.geometry.reasons import Standing
-from excite_cli.proof.certificate import Path, State
+from excite_cli.proof.certificate import Path, State, Worst
 from excite_cli.proof.enclosed_trajectory import Intervals, enclosed_states, intervals_of
-from excite_cli.proof.worst_margin import Worst
 
 Mask = NDArray[np.bool_]
 

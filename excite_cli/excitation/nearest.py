@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from excite_cli.constraints.drawing import Nearest
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.robot.model import Array

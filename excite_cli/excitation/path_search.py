@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.constraints.base import Array
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.excitation.problem import Problem
 
 Mask = NDArray[np.bool_]

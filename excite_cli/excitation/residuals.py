@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.constraints.base import Array, Constraint, Indices
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.kernels.compiled import KERNELS
 from excite_cli.trajectory.base import Basis
 

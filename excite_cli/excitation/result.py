@@ -5,9 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.excitation.doubt import Doubt
-from excite_cli.excitation.motion import Motion
-from excite_cli.excitation.motion_digest import digest_of
+from excite_cli.excitation.motion import Doubt, Motion, digest_of
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import RandomMotion
 from excite_cli.excitation.sequence import Step

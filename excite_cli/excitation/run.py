@@ -8,15 +8,15 @@ from excite_cli.config.load import parse_spec, spec_as_yaml
 from excite_cli.config.spec import OptimizerSpec, SequenceSpec, Spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.dense_grid import dense_condition_number
-from excite_cli.excitation.doubt import Doubt
 from excite_cli.excitation.ending import Ending
+from excite_cli.excitation.motion import Doubt
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import ProgressCallback, Status
 from excite_cli.excitation.result import Result, matches
 from excite_cli.excitation.sequence import Step, generate_sequence
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack
-from excite_cli.geometry.words import dropped_in_words
+from excite_cli.geometry.reasons import dropped_in_words
 from excite_cli.trajectory.chain import Segment
 from excite_cli.workers.base import Workers
 

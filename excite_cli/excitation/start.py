@@ -12,7 +12,7 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
 
 from excite_cli.constraints.base import Array, Constraint
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.task import MotionTask
 

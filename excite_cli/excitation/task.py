@@ -11,7 +11,7 @@ import numpy as np
 
 from excite_cli.constraints.base import Array
 from excite_cli.criteria.base import Criterion
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.excitation.objective import Spectrum
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Progress, Stage

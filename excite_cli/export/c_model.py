@@ -3,22 +3,64 @@
 Every effect states its own C (`Effect.in_c`); the file is `model_template.c` with its gaps filled.
 """
 
+import re
 from importlib.resources import files
 
 import numpy as np
 
 from excite_cli.effects.base import Effect
-from excite_cli.effects.c_code import reals
+from excite_cli.effects.c_code import real, reals
 from excite_cli.effects.sign import WIDTH
-from excite_cli.export.c_comment import in_comment
-from excite_cli.export.detector_in_c import detector_in_c
 from excite_cli.export.exported import ModelText, in_words
 from excite_cli.export.gaps import filled
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.regression import Series
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.tree import Tree, tree_of
-from excite_cli.scoring.thresholds import Thresholds
+from excite_cli.scoring.thresholds import REVERSAL, Residual, Thresholds
+
+# The collision detector of a model's C file: thresholds, their low pass, and a test of both.
+
+
+def detector_in_c(thresholds: Thresholds, count: int, step: float) -> str:
+    """Its code; the test runs over `count` instants, `step` [s] apart."""
+    text = (files("excite_cli.export") / "detector_template.c").read_text(encoding="utf-8")
+    rows = np.column_stack([thresholds.coefficients, thresholds.level])
+    gaps = {
+        "FALSE_ALARMS": f"{thresholds.false_alarms:g}",
+        "SOUND": ",\n".join(f"    {{{reals(row)}}}" for row in rows),
+        "TIME_CONSTANT": real(thresholds.time_constant),
+        "REVERSAL": real(REVERSAL),
+        "TEST_STEP": repr(step),
+        "DETECTED": "\n    "
+        + ",\n    ".join(map(reals, _detector_in_c_tested(thresholds, count, step))),
+    }
+    return filled(text, gaps)
+
+
+def _detector_in_c_tested(thresholds: Thresholds, count: int, step: float) -> Array:
+    """Filtered residuals over their thresholds (count, n), of the series that the C code makes."""
+    k, j = np.arange(count)[:, None], np.arange(len(thresholds.joint_names))
+    residual, speed = np.sin(0.7 * k + j), 0.2 * np.cos(0.3 * k + 2.0 * j)
+    run = Residual(residual, speed, 10.0 * np.sin(0.11 * k + j), step)
+    return thresholds.filtered(run.residual, step) / thresholds.at(run.speed, run.load)
+
+
+# Names in comments of C: nothing in them ends a comment, begins one or joins two lines.
+
+_PAIRS = re.compile(r"\*(?=/)|/(?=\*)|\?(?=\?)")  # ends, beginnings, trigraphs
+
+
+def in_comment(words: str) -> str:
+    """`words` with spaces in pairs that C reads, and `<U+000A>` for what has no glyph of its own.
+
+    So is a backslash, which joins lines, and a sign that turns the direction of a text round.
+    """
+    spaced = _PAIRS.sub(lambda pair: f"{pair.group()} ", words).replace("@", "(at)")
+    return "".join(
+        each if each.isprintable() and each != "\\" else f"<U+{ord(each):04X}>" for each in spaced
+    )
+
 
 _TESTED, _STEP, _SEED = 24, 0.01, 20170529
 

@@ -6,8 +6,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from excite_cli.config.plain_yaml import yaml_text
 from excite_cli.config.spec import Spec
-from excite_cli.config.write import yaml_text
 from excite_cli.diagnosis.candidates import effect_of
 from excite_cli.diagnosis.records import Diagnosis, EffectRecord
 from excite_cli.export.parameters import effect_specs

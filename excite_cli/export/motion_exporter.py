@@ -2,7 +2,9 @@
 
 from abc import ABC, abstractmethod
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
+
+import numpy as np
 
 from excite_cli.atomic import write_atomically
 from excite_cli.errors import FileError
@@ -50,3 +52,28 @@ def states_of(motion: TimedMotion) -> tuple[Array, Array, Array]:
     if motion.v is None or motion.a is None:
         raise FileError(f"{motion.name}: only a motion with speeds and accelerations is exported.")
     return motion.q, motion.v, motion.a
+
+
+# A timed motion as the fields of trajectory_msgs/msg/JointTrajectory.
+
+_NANO = 10**9
+
+
+def joint_trajectory(motion: TimedMotion) -> dict[str, Any]:
+    """The message as dictionaries and lists, every field of its definition in order."""
+    stamps = np.rint(motion.t * _NANO).astype(np.int64).tolist()
+    rows = zip(stamps, *(x.tolist() for x in states_of(motion)), strict=True)
+    return {
+        "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+        "joint_names": list(motion.joint_names),
+        "points": [
+            {
+                "positions": q,
+                "velocities": v,
+                "accelerations": a,
+                "effort": [],
+                "time_from_start": {"sec": stamp // _NANO, "nanosec": stamp % _NANO},
+            }
+            for stamp, q, v, a in rows
+        ],
+    }

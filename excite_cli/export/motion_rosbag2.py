@@ -9,8 +9,7 @@ import numpy as np
 
 from excite_cli.atomic import write_folder_atomically
 from excite_cli.errors import FileError, MissingExtraError
-from excite_cli.export.joint_trajectory import joint_trajectory
-from excite_cli.export.motion_exporter import MotionExporter
+from excite_cli.export.motion_exporter import MotionExporter, joint_trajectory
 from excite_cli.measurement.motion_bag import MESSAGE
 from excite_cli.measurement.timed_motion import TimedMotion
 

@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from excite_cli.config.write import yaml_text
+from excite_cli.config.plain_yaml import yaml_text
 from excite_cli.dynamics.regressor import PARAMETER_NAMES, PARAMETERS_PER_BODY
 from excite_cli.effects.base import Effect
 from excite_cli.identification.fit import Fit

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.geometry.obstacles import Box, Obstacle
 from excite_cli.geometry.world_segments import CapsuleAxes, WorldSegments
 from excite_cli.robot.capsule import Capsule

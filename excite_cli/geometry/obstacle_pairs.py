@@ -19,8 +19,7 @@ from excite_cli.errors import ConfigError, nearest
 from excite_cli.geometry.capsules import link_names
 from excite_cli.geometry.obstacle_distances import ObstacleDistances
 from excite_cli.geometry.obstacles import FLOOR, Obstacle
-from excite_cli.geometry.reasons import DroppedPair, Reason, Why
-from excite_cli.geometry.words import reason_in_words
+from excite_cli.geometry.reasons import DroppedPair, Reason, Why, reason_in_words
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.carried import MovedBodies
 from excite_cli.robot.model import Array, Robot

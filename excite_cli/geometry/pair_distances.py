@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.geometry.segments import Nearest, nearest_points, normals
 from excite_cli.geometry.world_segments import CapsuleAxes, WorldSegments
 from excite_cli.kernels.compiled import KERNELS

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from excite_cli.disk_cache import store_arrays, stored_arrays
 from excite_cli.errors import ConfigError
-from excite_cli.geometry.capsule_cache import geometry_key
+from excite_cli.geometry.capsules import geometry_key
 from excite_cli.geometry.collision_pairs import CollisionPairs
 from excite_cli.geometry.hull_bounds import hull_bounds
 from excite_cli.geometry.link_meshes import LinkMesh, Poses, link_meshes

@@ -16,9 +16,9 @@ import numpy as np
 from scipy.special import fdtrc
 
 from excite_cli.identification.covariance import Rows
-from excite_cli.identification.exact_period import exact_period
 from excite_cli.identification.factors import run_factors, stacked, together
 from excite_cli.identification.least_squares import fit_rows
+from excite_cli.identification.noise_floor import exact_period
 from excite_cli.measurement.dataset import Dataset, Mask, Run
 from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array

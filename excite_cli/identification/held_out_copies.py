@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from excite_cli.errors import FileError
 from excite_cli.identification.split import Split
-from excite_cli.measurement.dataset import Run
-from excite_cli.measurement.row_hashes import row_hashes
+from excite_cli.measurement.dataset import Run, row_hashes
 from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
 

@@ -9,7 +9,11 @@ from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import ExciteError
-from excite_cli.identification.declared_states import check_declared_runs, check_left_to_fit
+from excite_cli.identification.declared_states import (
+    LeftOut,
+    check_declared_runs,
+    check_left_to_fit,
+)
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.filter_bias import filter_findings, fitted_behind
 from excite_cli.identification.fit import Fit, effect_parameters, fit
@@ -22,7 +26,6 @@ from excite_cli.identification.hausman import (
 from excite_cli.identification.held_out_copies import refuse_held_out_copies
 from excite_cli.identification.identified_model import errors_on
 from excite_cli.identification.implausible_links import implausible
-from excite_cli.identification.left_out import LeftOut
 from excite_cli.identification.noise_floor import noise_floor
 from excite_cli.identification.prepare import (
     PreparedRun,
@@ -41,8 +44,8 @@ from excite_cli.identification.regression import (
 from excite_cli.identification.split import Split, split
 from excite_cli.identification.torque_scale import assumed_scale, knowledge_of
 from excite_cli.identification.torque_trace import TorqueTrace, torque_trace, torque_units
+from excite_cli.measurement.campaign_clock import Recorded, recorded
 from excite_cli.measurement.dataset import Dataset, Finding
-from excite_cli.measurement.recorded import Recorded, recorded
 from excite_cli.robot.model import Robot
 from excite_cli.shown.record import Shown
 

@@ -39,7 +39,7 @@ from excite_cli.identification.regression import (
     signals_of,
     with_effects,
 )
-from excite_cli.identification.stored_fit import StoredFit
+from excite_cli.identification.stored_model import StoredFit
 from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.link_frame import LinkFrame, carrying_frame

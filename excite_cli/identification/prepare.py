@@ -19,7 +19,7 @@ from excite_cli.identification.averages import (
     rounding_of,
     without,
 )
-from excite_cli.identification.left_out import LeftOut
+from excite_cli.identification.declared_states import LeftOut
 from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Array, Finding, Run
 from excite_cli.measurement.run_identity import RunId

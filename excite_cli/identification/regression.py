@@ -11,7 +11,7 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.covariance import Rows
-from excite_cli.identification.left_out import LeftOut
+from excite_cli.identification.declared_states import LeftOut
 from excite_cli.identification.prepare import PreparedRun, prepare_all
 from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Run

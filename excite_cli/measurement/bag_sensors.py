@@ -16,7 +16,7 @@ import numpy as np
 from excite_cli.errors import FileError
 from excite_cli.measurement.base_channel import BaseChannel, SensorKind
 from excite_cli.measurement.dataset import Array, Finding, Mask
-from excite_cli.measurement.message_stamps import MessageStamps, Stamps, unstamped_finding
+from excite_cli.measurement.joint_states import MessageStamps, Stamps, unstamped_finding
 from excite_cli.measurement.reader import RawRun
 
 _GAP, _STEPS = 0.02, 3.5  # s; times the usual step: as joint states are split at gaps

@@ -13,8 +13,7 @@ import numpy as np
 from excite_cli.errors import FileError
 from excite_cli.measurement.arrange import listed
 from excite_cli.measurement.dataset import Array, Finding
-from excite_cli.measurement.foreign_hdf5 import member, opened
-from excite_cli.measurement.hdf5_attributes import attribute
+from excite_cli.measurement.foreign_hdf5 import attribute, member, opened
 from excite_cli.measurement.memory_limit import limited_memory
 from excite_cli.measurement.reader import (
     RawRun,

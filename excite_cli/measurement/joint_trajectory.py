@@ -4,14 +4,17 @@ Its text forms (YAML of `ros2 topic pub`, JSON of MoveIt's RobotTrajectory) and 
 have the same fields. `time_from_start` counts whole nanoseconds.
 """
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from excite_cli.config.plain_yaml import parse_plain
 from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Array
+from excite_cli.measurement.motion_reader import MotionReader, text_of
 from excite_cli.measurement.reader import check_values
 from excite_cli.measurement.timed_motion import TimedMotion
 
@@ -75,3 +78,37 @@ def _column(path: Path, points: list[Any], field: str, width: int) -> Array | No
         return np.array(rows, dtype=float)
     except (ValueError, TypeError, OverflowError) as error:
         raise FileError(f"{path}: {field} are not all numbers: {error}.") from error
+
+
+# Motions as YAML of a JointTrajectory message, as `ros2 topic pub` takes it.
+
+
+class MotionRos2(MotionReader):
+    """`.yaml`."""
+
+    title = "ROS 2 YAML"
+    suffixes = (".yaml", ".yml")
+
+    def read(self, path: Path) -> TimedMotion:
+        """The first document of the file."""
+        return motion_of(path, parse_plain(text_of(path), str(path)))
+
+
+# Motions as JSON of moveit_msgs/msg/RobotTrajectory, or of a JointTrajectory alone.
+
+
+class MotionMoveit(MotionReader):
+    """`.json`."""
+
+    title = "MoveIt JSON"
+    suffixes = (".json",)
+
+    def read(self, path: Path) -> TimedMotion:
+        """The field `joint_trajectory`, if there is one, else the whole."""
+        try:
+            tree = json.loads(text_of(path))
+        except (ValueError, RecursionError) as error:
+            raise FileError(f"{path} is not valid JSON: {error}.") from error
+        if isinstance(tree, dict) and "joint_trajectory" in tree:
+            tree = tree["joint_trajectory"]
+        return motion_of(path, tree)

@@ -4,12 +4,11 @@ from pathlib import Path
 
 from excite_cli.errors import FileError
 from excite_cli.given_files import require_stored
+from excite_cli.measurement.joint_trajectory import MotionMoveit, MotionRos2
 from excite_cli.measurement.motion_bag import MotionBag
 from excite_cli.measurement.motion_csv import MotionCsv
-from excite_cli.measurement.motion_moveit import MotionMoveit
 from excite_cli.measurement.motion_npz import MotionNpz
 from excite_cli.measurement.motion_reader import MotionReader
-from excite_cli.measurement.motion_ros2 import MotionRos2
 from excite_cli.measurement.timed_motion import TimedMotion, arranged, checked
 
 MOTION_READERS: tuple[MotionReader, ...] = (

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from excite_cli.errors import FileError
-from excite_cli.measurement.dataset import Array, Finding, Mask, Run
+from excite_cli.measurement.dataset import Array, Finding, Mask, Run, row_hashes
 from excite_cli.measurement.missing_values import BEYOND, rows_of
-from excite_cli.measurement.row_hashes import row_hashes
 from excite_cli.measurement.run_identity import Part
 
 _EVEN = 0.05  # of a step

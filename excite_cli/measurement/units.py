@@ -10,10 +10,9 @@ import numpy as np
 
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.measurement.angles import check_angles
-from excite_cli.measurement.clock import check_clock
 from excite_cli.measurement.dataset import Finding, Run
 from excite_cli.measurement.limits import Limits
-from excite_cli.measurement.speeds import Speeds, extremes, speeds, usual_gain
+from excite_cli.measurement.speeds import Speeds, check_clock, extremes, speeds, usual_gain
 from excite_cli.measurement.torque import METERS, SECONDS
 
 _CLOSE = 0.2  # share by which a gain may miss the factor it is taken for

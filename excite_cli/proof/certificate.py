@@ -9,18 +9,40 @@ that whatever has a margin of more than rounding is proved after few cuts.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.enclosed_trajectory import Intervals, enclosed_states, intervals_of
-from excite_cli.proof.worst_margin import Worst
 from excite_cli.robot.model import Robot
 from excite_cli.trajectory.base import Trajectory
+
+# The record of the smallest margin of a constraint over a motion.
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The smallest margin of a constraint over a motion, with where and when it occurs.
+
+    Smallest as a `share` of the scale of its column, so that joints of different size compare.
+    """
+
+    margin: float
+    unit: str
+    label: str
+    time: float
+    violations: int
+    share: float = 0.0
+
+    def with_later(self, later: "Worst") -> "Worst":
+        """The worse of two, by the share of the scale, with the violations of both."""
+        worse = later if later.share < self.share else self
+        return replace(worse, violations=self.violations + later.violations)
+
 
 Array = NDArray[np.float64]
 State = Literal["proved", "sampled", "broken"]

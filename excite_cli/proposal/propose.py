@@ -15,15 +15,13 @@ from excite_cli.proposal.disabled_pairs import chosen_srdf, disabled_pairs
 from excite_cli.proposal.joints import Choice, choose_joints
 from excite_cli.proposal.limits import MOST_ACCELERATION, JointPlan, plan_limits
 from excite_cli.proposal.pace import Pace, choose_pace
-from excite_cli.proposal.posture import FirstPosture, first_posture
-from excite_cli.proposal.settle import Comments, Settled, Tree, settle
+from excite_cli.proposal.settle import Comments, FirstPosture, Settled, Tree, first_posture, settle
 from excite_cli.proposal.shapes import Shapes, choose_shapes
 from excite_cli.robot.assumed_inertias import with_assumed_inertias
 from excite_cli.robot.description import RobotDescription
 from excite_cli.robot.model import build_robot
 from excite_cli.robot.package_search import Allow, allow_nothing, load_with_folders
-from excite_cli.robot.reference_postures import reference_posture
-from excite_cli.robot.srdf import read_srdf, srdf_near
+from excite_cli.robot.srdf import read_srdf, reference_posture, srdf_near
 from excite_cli.robot.urdf_joints import UrdfSurvey
 from excite_cli.shown.record import Shown
 

@@ -8,18 +8,44 @@ from excite_cli.diagnosis.answer_words import answer_in_words
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
-from excite_cli.identification.stored_fit import StoredFit
+from excite_cli.identification.stored_model import StoredFit
 from excite_cli.report.campaign import Campaign
-from excite_cli.report.campaign_sections import campaign_figures, campaign_sections
-from excite_cli.report.compare_models import compare_diagnoses, compare_fits
-from excite_cli.report.compare_section import comparable, compare_results
+from excite_cli.report.compare_section import (
+    comparable,
+    compare_diagnoses,
+    compare_fits,
+    compare_results,
+)
+from excite_cli.report.condition_section import condition_figures, condition_section
+from excite_cli.report.config_section import config_section
 from excite_cli.report.diagnosis_sections import diagnosis_figures, diagnosis_sections
 from excite_cli.report.fit_sections import fit_figures, fit_sections
+from excite_cli.report.margin_section import margin_figures, margin_section
+from excite_cli.report.motion_section import motion_section
 from excite_cli.report.page import KeyFigure, Page, Section, Text
 from excite_cli.report.score_sections import score_figures, score_sections
+from excite_cli.report.weakest_section import weakest_section
 from excite_cli.scoring.records import Score
 from excite_cli.summary.doubts import doubts_in_words
 from excite_cli.summary.score import sentences
+
+# All that a page says about one result file, in reading order.
+
+
+def campaign_figures(campaign: Campaign) -> tuple[KeyFigure, ...]:
+    """What sums it up."""
+    return (*condition_figures(campaign), *margin_figures(campaign))
+
+
+def campaign_sections(campaign: Campaign, picture: bool = True) -> tuple[Section, ...]:
+    """Condition numbers, what shows least, motions, margins, how it was made."""
+    return (
+        condition_section(campaign, picture),
+        motion_section(campaign),
+        margin_section(campaign),
+        weakest_section(campaign),
+        config_section(campaign),
+    )
 
 
 @dataclass(frozen=True)

@@ -1,16 +1,71 @@
 """Several results side by side: condition numbers, worst margins, what their configs differ in."""
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from excite_cli.config.load import parse_spec
+from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.identification.stored_model import StoredFit
 from excite_cli.report.campaign import Campaign, in_figures
 from excite_cli.report.chart import Colour
-from excite_cli.report.config_differences import differences
 from excite_cli.report.page import Block, Charts, Section, Table, Text
 from excite_cli.report.plot import Panel, Plot, Series
+
+# Which keys of several configs differ, with their values.
+
+_LONGEST = 80
+
+
+def differences(names: Sequence[str], configs: Sequence[str]) -> Block:
+    """A table of the keys (`constraints.torque.scale`) that are not the same in all `configs`.
+
+    Parameters
+    ----------
+    names
+        What each config belongs to, for the columns.
+    configs
+        Resolved problems as YAML text.
+
+    Raises
+    ------
+    ConfigError
+        A text is no config.
+    """
+    flat = [
+        flattened(parse_spec(text, f"the config of {name}").model_dump(mode="json"))
+        for name, text in zip(names, configs, strict=True)
+    ]
+    keys = dict.fromkeys(key for values in flat for key in values)
+    rows = [(key, *(_said(values, key) for values in flat)) for key in keys]
+    differing = tuple(row for row in rows if len(set(row[1:])) > 1)
+    if not differing:
+        return Text("The configs are the same, key by key.")
+    return Table(("key", *names), differing, title="What differs in the configs")
+
+
+def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Leaves of nested mappings by their dotted paths; lists count as leaves."""
+    found: dict[str, Any] = {}
+    for key, value in tree.items():
+        path = f"{prefix}{key}"
+        if isinstance(value, Mapping) and value:
+            found |= flattened(value, f"{path}.")
+        else:
+            found[path] = value
+    return found
+
+
+def _said(values: Mapping[str, Any], key: str) -> str:
+    if key not in values:
+        return "–"
+    text = json.dumps(values[key], ensure_ascii=False)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
+
 
 _NOT_COMPARABLE = (
     "These files differ in robot, moved joints, rows, effects or weights: their condition numbers "
@@ -132,3 +187,83 @@ def _worst(campaign: Campaign, kind: str) -> str:
         return "–"
     worst = min(found, key=lambda each: each.share)
     return f"{in_figures(worst.margin)} {worst.unit}"
+
+
+# Several fits, or several diagnoses, side by side: errors, what was found, what differs.
+
+
+def compare_fits(fits: Mapping[str, StoredFit]) -> Section:
+    """Errors of several fits on held-out data, what the data fix, and the differing keys."""
+    rows = tuple(
+        (
+            name,
+            stored.held_out_run,
+            _percent(stored.training_error.mean_relative_moving),
+            _percent(stored.error.mean_relative_moving),
+            f"{int(np.sum(stored.fit.identifiable))} of {len(stored.fit.names)}",
+        )
+        for name, stored in fits.items()
+    )
+    table = Table(
+        ("file", "held-out run", "training error", "held-out error", "identifiable"),
+        rows,
+        title="Mean relative error of the torque where joints move",
+        right=frozenset({2, 3, 4}),
+    )
+    configs = [stored.config for stored in fits.values()]
+    blocks: tuple[Block, ...] = (table, differences(list(fits), configs))
+    return Section("compare-fits", "Fits side by side", blocks)
+
+
+def compare_diagnoses(diagnoses: Mapping[str, Diagnosis]) -> Section:
+    """What several diagnoses found, their errors on held-out data and the differing keys."""
+    rows = tuple(
+        (
+            name,
+            diagnosis.held_out_run,
+            _percent(diagnosis.before.mean_relative_moving),
+            _percent(diagnosis.after.mean_relative_moving),
+            "; ".join(
+                f"{each.effect.kind.replace('_', ' ')} on {', '.join(each.effect.joints)}"
+                for each in diagnosis.effects
+            )
+            or "nothing",
+        )
+        for name, diagnosis in diagnoses.items()
+    )
+    errors = Table(
+        ("file", "held-out run", "error before", "error after", "found"),
+        rows,
+        title="Mean relative error of the torque where joints move, on held-out data",
+        right=frozenset({2, 3}),
+    )
+    blocks: list[Block] = [errors, *_by_joint(diagnoses)]
+    names = list(diagnoses)
+    blocks.append(differences(names, [diagnosis.config for diagnosis in diagnoses.values()]))
+    return Section("compare-diagnoses", "Diagnoses side by side", tuple(blocks))
+
+
+def _by_joint(diagnoses: Mapping[str, Diagnosis]) -> list[Block]:
+    joints = dict.fromkeys(joint for each in diagnoses.values() for joint in each.joint_names)
+    rows = tuple(
+        (
+            joint,
+            *(
+                f"{_of(each.before.relative_moving, joint)} → "
+                f"{_of(each.after.relative_moving, joint)}"
+                for each in diagnoses.values()
+            ),
+        )
+        for joint in joints
+    )
+    right = frozenset(range(1, len(diagnoses) + 1))
+    title = "The same joint by joint, before → after"
+    return [Table(("joint", *diagnoses), rows, title, right)]
+
+
+def _of(errors: Mapping[str, float], joint: str) -> str:
+    return _percent(errors[joint]) if joint in errors else "–"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.3g} %" if np.isfinite(share) else "–"

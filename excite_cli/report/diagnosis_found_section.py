@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from math import isnan
 
-from excite_cli.diagnosis.change_words import changes_in_words
 from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.diagnosis.words import (
     SMALL_PART,
     approximation_in_words,
     by_worth,
+    changes_in_words,
     counted,
     covariate_in_words,
     held_out_in_words,

@@ -9,8 +9,8 @@ from excite_cli.excitation.admissible import fine_margins
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
-from excite_cli.geometry.words import reason_in_words
-from excite_cli.proof.worst_margin import Worst
+from excite_cli.geometry.reasons import reason_in_words
+from excite_cli.proof.certificate import Worst
 from excite_cli.report.campaign import Campaign, in_figures
 from excite_cli.report.motion_section import drawn_motions, not_drawn
 from excite_cli.report.page import Block, Charts, Choice, KeyFigure, Section, Table, Text

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
+from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.report.campaign import Campaign, in_figures

@@ -9,14 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.constraints.drawing import Nearest
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.excitation.nearest import closest_time, nearest_bodies
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.geometry.obstacles import Box
 from excite_cli.report.campaign import Campaign, in_figures
-from excite_cli.report.chart import Chart
-from excite_cli.report.side_view import side_view
+from excite_cli.report.chart import Chart, side_view
 from excite_cli.robot.model import Array
 from excite_cli.trajectory.chain import Segment
 

@@ -6,8 +6,7 @@ from math import isfinite
 
 import numpy as np
 
-from excite_cli.report.chart import Chart
-from excite_cli.report.side_view import side_view
+from excite_cli.report.chart import Chart, side_view
 from excite_cli.robot.model import Array
 from excite_cli.robot.skeleton import Skeleton
 

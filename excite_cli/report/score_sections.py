@@ -6,7 +6,7 @@ from excite_cli.report.chart import Colour
 from excite_cli.report.page import Charts, KeyFigure, Section, Table
 from excite_cli.report.plot import Panel, Plot, Series
 from excite_cli.scoring.records import Score
-from excite_cli.shown.table import Table as ShownTable
+from excite_cli.shown.answer import Table as ShownTable
 from excite_cli.summary.score import joints_table, runs_table
 
 _COLOURS: tuple[Colour, ...] = ("blue", "vermilion", "green", "purple", "ink", "muted")

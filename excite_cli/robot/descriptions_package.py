@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from excite_cli.errors import MissingExtraError, RobotError, nearest
-from excite_cli.robot.apart import command, environment
+from excite_cli.robot.confinement import command, environment
 
 PREFIX = "robot_descriptions:"
 _PACKAGE = "robot_descriptions"

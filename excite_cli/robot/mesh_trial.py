@@ -24,8 +24,14 @@ from pathlib import Path
 from typing import Any
 
 from excite_cli.errors import RobotError
-from excite_cli.robot.apart import OUT_OF_TIME, command, environment, limit_memory, set_alarm
-from excite_cli.robot.confinement import confine
+from excite_cli.robot.confinement import (
+    OUT_OF_TIME,
+    command,
+    confine,
+    environment,
+    limit_memory,
+    set_alarm,
+)
 from excite_cli.robot.formats.kept_meshes import is_sound, keep_mesh, kept_meshes_folder
 
 SUFFIXES = (".stl", ".dae", ".obj", ".ply")

@@ -9,9 +9,8 @@ import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, replace
 
 from excite_cli.robot.description import RobotDescription
-from excite_cli.robot.limits import JointRange
+from excite_cli.robot.limits import UNBOUNDED, JointRange
 from excite_cli.robot.mimic import Mimic
-from excite_cli.robot.written_limits import UNBOUNDED
 
 
 @dataclass(frozen=True)

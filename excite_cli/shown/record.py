@@ -4,12 +4,51 @@ A record says only that it is shown (it inherits from `Shown`, with `@dataclass(
 words and tables of each are written down in one package above all of them, which `show` connects.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from html import escape
 from typing import Any, TypeVar
 
-from excite_cli.shown.html import as_html
-from excite_cli.shown.table import Parts
+from excite_cli.shown.answer import Command, Part, Parts, Table
+
+# Tables, sentences and commands as HTML, for notebooks.
+
+
+def as_html(parts: Iterable[Part]) -> str:
+    """Tables and paragraphs, without style but the alignment; texts are escaped."""
+    return "\n".join(map(_part, parts))
+
+
+def _part(part: Part) -> str:
+    if isinstance(part, Table):
+        return _table(part)
+    if isinstance(part, Command):
+        return f"<pre>{escape(part.line)}</pre>"
+    return f"<p>{_text(part)}</p>"
+
+
+def _table(table: Table) -> str:
+    head = "".join(_cell(table, "th", name, name) for name in table.columns)
+    rows = "\n".join(
+        "<tr>" + "".join(_row(table, number, row)) + "</tr>"
+        for number, row in enumerate(table.rows)
+    )
+    title = f"<p><b>{_text(table.title)}</b></p>\n" if table.title else ""
+    return f"{title}<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{rows}\n</tbody>\n</table>"
+
+
+def _row(table: Table, number: int, row: tuple[str, ...]) -> list[str]:
+    tag = "th" if number in table.bold else "td"
+    return [_cell(table, tag, name, text) for name, text in zip(table.columns, row, strict=True)]
+
+
+def _cell(table: Table, tag: str, column: str, text: str) -> str:
+    side = "left" if column in table.left or column in table.words else "right"
+    return f'<{tag} style="text-align: {side}">{_text(text)}</{tag}>'
+
+
+def _text(text: str) -> str:
+    return escape(text).replace("\n", "<br>")
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import eigh
 
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
+from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Signals
 from excite_cli.robot.model import Array, Robot

@@ -6,7 +6,8 @@ sits on θ alone, the spring or the backlash acts on δ. A joint that follows an
 held where that stands by a constraint as hard as MuJoCo has.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,9 +15,44 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
+from excite_cli.errors import MissingExtraError
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.tree import Tree, TreeJoint, tree_of
-from excite_cli.simulation.engine import load_mujoco
+
+# MuJoCo, loaded where it is needed: it is an extra, and importing it takes a moment.
+
+
+def load_mujoco() -> Any:
+    """The module.
+
+    Raises
+    ------
+    MissingExtraError
+        It is not installed.
+    """
+    try:
+        import mujoco
+    except ImportError as error:
+        raise MissingExtraError(
+            "Simulating needs MuJoCo, which is not installed. "
+            "Install it with: pip install 'excite-cli[sim]'"
+        ) from error
+    return mujoco
+
+
+@contextmanager
+def silent_engine() -> Iterator[None]:
+    """Within this context MuJoCo neither prints warnings nor writes MUJOCO_LOG.TXT.
+
+    What they would tell is checked here, and told in our words.
+    """
+    mujoco = load_mujoco()
+    mujoco.set_mju_user_warning(lambda text: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(None)
+
 
 # A friction constraint this hard reaches its full force within micro-radians per second of slip.
 _CRISP = (0.9999, 0.9999, 1e-3, 0.5, 2.0)

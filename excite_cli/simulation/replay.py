@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.robot.model import Array
-from excite_cli.simulation.engine import load_mujoco
+from excite_cli.simulation.mujoco_model import load_mujoco
 
 BANDWIDTH = 10.0  # rad/s
 _SLACK = 0.05  # rad

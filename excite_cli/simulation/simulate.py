@@ -15,7 +15,7 @@ from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 from excite_cli.shown.record import Shown
 from excite_cli.simulation.base_sensors import Instruments
-from excite_cli.simulation.build import assemble, make
+from excite_cli.simulation.build import assemble, make, true_inertias
 from excite_cli.simulation.controller import (
     Reference,
     compensated,
@@ -23,14 +23,12 @@ from excite_cli.simulation.controller import (
     gains_of,
     reference_of,
 )
-from excite_cli.simulation.declared import sized
-from excite_cli.simulation.engine import silent_engine
+from excite_cli.simulation.mujoco_model import silent_engine
 from excite_cli.simulation.planned_motion import Planned
-from excite_cli.simulation.planted import Planted
+from excite_cli.simulation.planted import Planted, sized
 from excite_cli.simulation.play import Played, play
 from excite_cli.simulation.record import record
 from excite_cli.simulation.settings import SimulationSettings
-from excite_cli.simulation.true_robot import true_inertias
 
 Progress = Callable[[str, int], None]
 _FIRST_DAY = 1.7e9  # s from 1970: when a simulated campaign with pauses begins

@@ -4,6 +4,7 @@ Reading trusts nothing: a foreign or damaged file gives one message.
 """
 
 import json
+from collections.abc import Mapping
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
@@ -15,6 +16,7 @@ from excite_cli.atomic import write_atomically
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.records import (
     Absorbed,
+    Approximation,
     Assumption,
     Diagnosis,
     EffectRecord,
@@ -28,21 +30,50 @@ from excite_cli.diagnosis.records import (
     Round,
     Textbook,
 )
+from excite_cli.diagnosis.words import approximation_in_words
 from excite_cli.identification.errors_of_torque import Errors
+from excite_cli.measurement.campaign_clock import Recorded
 from excite_cli.measurement.dataset import Finding
-from excite_cli.measurement.hdf5_file import new_hdf5
-from excite_cli.measurement.recorded import Recorded
+from excite_cli.measurement.hdf5_writer import new_hdf5
 from excite_cli.robot.skeleton import Skeleton
 from excite_cli.store import checked
-from excite_cli.store.approximation_text import approximation_as_data, approximation_of
-from excite_cli.store.joint_errors import require_joints
 from excite_cli.store.own_file import PROGRAM, OwnFile, is_marked, opened
 from excite_cli.store.trace_groups import (
     read_torque_traces,
     read_traces,
+    require_joints,
     write_torque_traces,
     write_traces,
 )
+
+# What an effect only comes near, as files have it.
+
+
+def approximation_as_data(found: Approximation | None) -> dict[str, Any]:
+    """Entries of an effect's record: a text for people, and itself."""
+    if found is None:
+        return {"approximates": ""}
+    codes = [covariate.code for covariate in found.covariates]
+    return {
+        "approximates": approximation_in_words(found),
+        "approximation": {"covariates": codes, "kind": found.kind},
+    }
+
+
+def approximation_of(data: Mapping[str, Any]) -> Approximation | None:
+    """The approximation in an effect's record, if it is one.
+
+    Raises
+    ------
+    ValueError
+        Nothing that a residual may depend on.
+    """
+    given = data.get("approximation")
+    if given is None:
+        return None
+    covariates = tuple(Covariate.of_code(str(code)) for code in given["covariates"])
+    return Approximation(covariates, str(given["kind"]))
+
 
 SCHEMA = 2  # since 0.3, which says held-out for sealed
 CONTENT = "diagnosis"

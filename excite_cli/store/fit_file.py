@@ -20,15 +20,13 @@ from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit import Fit
 from excite_cli.identification.identify import Identification
 from excite_cli.identification.link_changes import LinkChange
-from excite_cli.identification.stored_fit import StoredFit
+from excite_cli.identification.stored_model import StoredFit
+from excite_cli.measurement.campaign_clock import Recorded
 from excite_cli.measurement.dataset import Finding
-from excite_cli.measurement.hdf5_file import new_hdf5
-from excite_cli.measurement.recorded import Recorded
+from excite_cli.measurement.hdf5_writer import new_hdf5
 from excite_cli.store import checked
-from excite_cli.store.joint_errors import require_joints
-from excite_cli.store.own_file import PROGRAM, OwnFile, is_marked, opened
-from excite_cli.store.trace_groups import read_torque_traces, write_torque_traces
-from excite_cli.store.versions import versions
+from excite_cli.store.own_file import PROGRAM, OwnFile, is_marked, opened, versions
+from excite_cli.store.trace_groups import read_torque_traces, require_joints, write_torque_traces
 
 SCHEMA = 2  # since 0.3, which says held-out for sealed
 KIND = "fit"

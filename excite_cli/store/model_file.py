@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from excite_cli.config.identified_spec import IdentifiedSpec
 from excite_cli.config.load import load_spec, parse_spec
-from excite_cli.config.spec import Spec
+from excite_cli.config.spec import IdentifiedSpec, Spec
 from excite_cli.diagnosis.candidates import effect_of
 from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.dynamics.base_parameters import find_base_parameters

@@ -3,16 +3,34 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import h5py
 from pydantic import ValidationError
 
+from excite_cli import __version__
 from excite_cli.errors import ExciteError, FileError
 from excite_cli.given_files import require_stored
-from excite_cli.measurement.hdf5_attributes import attribute, require_plain
+from excite_cli.measurement.foreign_hdf5 import attribute, require_plain
 from excite_cli.measurement.memory_limit import limited_memory
+
+# Versions of the program and of the libraries that decide its numbers.
+
+_LIBRARIES = ("pin", "coal", "numpy", "scipy", "h5py", "clarabel", "mujoco", "example-robot-data")
+
+
+def versions() -> dict[str, str]:
+    """Installed version of each library, `missing` where there is none."""
+    found = {"excite-cli": __version__}
+    for name in _LIBRARIES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = "missing"
+    return found
+
 
 PROGRAM = "excite"
 _MOTIONS = "motions"  # the content of files that have no marker of their own

@@ -4,7 +4,9 @@ The file is written anew and put in place after every finished motion, so that i
 time. Reading trusts nothing: a foreign or damaged file gives one message.
 """
 
+import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -14,19 +16,43 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.atomic import write_atomically
-from excite_cli.excitation.motion import Motion
+from excite_cli.excitation.motion import Doubt, Motion, digest_of_array
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Status
 from excite_cli.excitation.random_baseline import RandomMotion
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.stack import Stack
-from excite_cli.measurement.hdf5_file import new_hdf5
+from excite_cli.measurement.hdf5_writer import new_hdf5
 from excite_cli.measurement.memory_limit import limited_memory
-from excite_cli.proof.worst_margin import Worst
+from excite_cli.proof.certificate import Worst
+from excite_cli.robot.model import Array
 from excite_cli.store import checked
-from excite_cli.store.motion_state import as_found, digest_with_samples
 from excite_cli.store.own_file import PROGRAM, OwnFile, opened
 from excite_cli.trajectory.catalogue import build_trajectory
+
+# Whether a motion in a file is still the one that was proved, by the digest that it was given.
+#
+# The digest in a file is that of the motion (`excitation/motion.py`) and of its samples in
+# the file: what a script reads there is part of what must not have changed.
+
+
+def digest_with_samples(digest: str, samples: Sequence[Array]) -> str:
+    """What a file holds of a motion of this `digest`, with its samples t (T,), q, v, a (T, n)."""
+    parts = (digest, *map(digest_of_array, samples))
+    return hashlib.sha256("|".join(parts).encode()).hexdigest()
+
+
+def as_found(motion: Motion, digest: str, samples: Sequence[Array], stored: str) -> Motion:
+    """The motion of a file, doubted where it is not what it was.
+
+    `digest` is that of what the file holds now, `stored` what the file says; empty: nothing.
+    """
+    if not stored:
+        return motion.doubted(Doubt.EARLIER)
+    if stored == digest_with_samples(digest, samples):
+        return replace(motion, digest=digest)
+    return replace(motion.doubted(Doubt.CHANGED), digest=stored)
+
 
 Matrix = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from excite_cli.atomic import write_atomically
-from excite_cli.measurement.hdf5_file import new_hdf5
+from excite_cli.measurement.hdf5_writer import new_hdf5
 from excite_cli.scoring.records import Score
 from excite_cli.store import checked
 from excite_cli.store.own_file import PROGRAM, OwnFile, is_marked, opened

@@ -8,9 +8,28 @@ import numpy as np
 
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.traces import Dependence, EffectTrace, Traces
+from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.robot.model import Array
 from excite_cli.store import checked
+
+# Errors and noise floors of a file: of the joints that the file names.
+
+
+def require_joints(
+    joints: Sequence[str], errors: Sequence[Errors], noise_floor: Mapping[str, float] | None
+) -> None:
+    """Raise ValueError where they are of other joints."""
+    found: list[Mapping[str, float]] = [
+        mapping
+        for each in errors
+        for mapping in (each.relative, each.relative_moving, each.rms, each.rms_raw)
+    ]
+    found += [each.samples for each in errors if each.samples]
+    others = set(noise_floor or ()) - set(joints)
+    if others or any(set(mapping) != set(joints) for mapping in found):
+        raise ValueError("its errors are those of other joints")
+
 
 _TORQUE = ("q", "v", "a", "load", "measured", "predicted")
 _EFFECT = ("x", "own", "partial")

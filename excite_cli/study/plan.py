@@ -7,8 +7,7 @@ from pathlib import Path
 
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.given_files import require_stored
-from excite_cli.study.case import StudyCase, StudyTask
-from excite_cli.study.request import contents_of, request_of
+from excite_cli.study.case import StudyCase, StudyTask, contents_of, request_of
 from excite_cli.study.vary import Varied, combinations
 
 _LONGEST = 100  # bytes of a name: with digest, suffix and `.part` a file system still takes it

@@ -4,9 +4,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 from excite_cli.campaign.records import Campaign, Learned, Round
-from excite_cli.shown.answer import Answer
+from excite_cli.shown.answer import Answer, Part, Table
 from excite_cli.shown.record import show
-from excite_cli.shown.table import Part, Table
 
 
 def round_in_words(number: int, learned: Learned) -> str:

@@ -1,6 +1,15 @@
 """Numbers in tables; what is not known is "-"."""
 
-from math import isnan
+from collections.abc import Mapping
+from math import isnan, nan
+
+# The files that a command has written, told at the end of its answer.
+
+
+def files_in_words(files: Mapping[str, str]) -> list[str]:
+    """One line for all `files`, by what they hold; none if nothing was written."""
+    listed = ", ".join(f"{path} ({kind})" for kind, path in files.items())
+    return [f"Written: {listed}."] if files else []
 
 
 def percent(share: float) -> str:
@@ -16,3 +25,20 @@ def points(share: float) -> str:
 def figure(value: float) -> str:
     """Four digits."""
     return "-" if isnan(value) else f"{value:.4g}"
+
+
+# The noise floor in tables, for `excite identify` and `excite diagnose`.
+
+COLUMN = "noise floor"
+
+
+def floor_columns(floor: dict[str, float] | None) -> list[str]:
+    """The column's title, if there is one."""
+    return [] if floor is None else [COLUMN]
+
+
+def floor_cells(floor: dict[str, float] | None, joint: str) -> list[str]:
+    """What stands in the column, if there is one."""
+    if floor is None:
+        return []
+    return [figure(floor.get(joint, nan))]

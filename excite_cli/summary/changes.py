@@ -7,10 +7,9 @@ from typing import Any
 
 from excite_cli.identification.fit_words import with_deviation
 from excite_cli.scoring.changes import Change, Changes
-from excite_cli.shown.answer import Answer
+from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
-from excite_cli.shown.table import Parts, Table
-from excite_cli.summary.written import files_in_words
+from excite_cli.summary.cells import files_in_words
 
 _SHOWN = 12  # rows at least, changed or not
 _TOLD = 4

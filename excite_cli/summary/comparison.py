@@ -3,9 +3,8 @@
 from excite_cli.excitation.comparison import Comparison
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.random_baseline import RandomMotion
-from excite_cli.shown.answer import Answer
+from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
-from excite_cli.shown.table import Parts, Table
 from excite_cli.summary.motions import motion_data
 
 

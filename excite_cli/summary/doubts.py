@@ -1,9 +1,24 @@
 """Motions that do not count as proved, in words."""
 
 from collections.abc import Sequence
+from typing import Any
 
-from excite_cli.excitation.doubt import Doubt
-from excite_cli.excitation.motion import Motion
+from excite_cli.excitation.motion import Doubt, Motion
+from excite_cli.proof.certificate import Worst
+
+# Worst margins for scripts.
+
+
+def worst_data(worst: Worst) -> dict[str, Any]:
+    """A worst margin for `--json`."""
+    return {
+        "margin": worst.margin,
+        "share": worst.share,
+        "unit": worst.unit,
+        "where": worst.label,
+        "time": worst.time,
+        "violations": worst.violations,
+    }
 
 
 def doubts_in_words(motions: Sequence[Motion]) -> list[str]:

@@ -5,10 +5,9 @@ from math import isnan
 
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.identification.errors_of_torque import Errors
-from excite_cli.shown.table import Parts, Table
-from excite_cli.summary.cells import figure, percent
+from excite_cli.shown.answer import Parts, Table
+from excite_cli.summary.cells import figure, floor_cells, floor_columns, percent
 from excite_cli.summary.named_effects import what_and_where
-from excite_cli.summary.noise_floor import floor_cells, floor_columns
 
 _OFF = "reduced by (pp)"
 _NAMED, _WORTH = 3, 0.1  # parts that are named in a row, and the least share of the fall

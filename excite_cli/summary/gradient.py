@@ -6,9 +6,8 @@ from excite_cli.excitation.gradient_check import (
     PAPER_FORWARD_ERROR,
     GradientCheck,
 )
-from excite_cli.shown.answer import Answer
+from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
-from excite_cli.shown.table import Parts, Table
 
 _PAIRS = {
     "adjoint_vs_block": ("adjoint – block form", f"{ADJOINT_BLOCK_LIMIT:.0e}"),

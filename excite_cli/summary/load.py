@@ -4,9 +4,8 @@ from typing import Any
 
 from excite_cli.identification.fit_words import with_deviation
 from excite_cli.identification.load import LoadIdentification
-from excite_cli.shown.answer import Answer
+from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
-from excite_cli.shown.table import Parts, Table
 from excite_cli.summary.cells import percent
 
 

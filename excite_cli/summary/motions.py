@@ -14,11 +14,9 @@ from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Status
 from excite_cli.excitation.result import Result
-from excite_cli.shown.answer import Answer
+from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
-from excite_cli.shown.table import Parts, Table
-from excite_cli.summary.doubts import doubts_in_words
-from excite_cli.summary.margins import worst_data
+from excite_cli.summary.doubts import doubts_in_words, worst_data
 from excite_cli.summary.pairs import pairs_data, pairs_in_words
 from excite_cli.summary.problem import problem_parts
 from excite_cli.trajectory.chain import Segment

@@ -5,8 +5,7 @@ from typing import Any
 from excite_cli.constraints.obstacle_clearance import Surroundings
 from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.excitation.problem import Problem
-from excite_cli.geometry.reasons import DroppedPair, Why
-from excite_cli.geometry.words import dropped_in_words, reason_in_words
+from excite_cli.geometry.reasons import DroppedPair, Why, dropped_in_words, reason_in_words
 from excite_cli.robot.model import links_by_joint
 
 # Reasons that leave a pair to chance; the others say that nothing can happen.

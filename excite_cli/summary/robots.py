@@ -2,12 +2,10 @@
 
 from collections.abc import Sequence
 
-from excite_cli.robot.described import DescribedJoint, DescribedRobot
 from excite_cli.robot.description import EXAMPLE_PREFIX
-from excite_cli.robot.glance import Glance
-from excite_cli.shown.answer import Answer
+from excite_cli.robot.glance import DescribedJoint, DescribedRobot, Glance
+from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
-from excite_cli.shown.table import Parts, Table
 
 
 def robots_answer(found: Sequence[Glance], names: Sequence[str]) -> Answer:

@@ -5,10 +5,31 @@ from typing import Any
 
 from excite_cli.diagnosis.words import place_in_words, title_of, value_in_words
 from excite_cli.scoring.records import Reason, Score, ScoredRun
-from excite_cli.shown.answer import Answer
+from excite_cli.scoring.thresholds import Thresholds
+from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
-from excite_cli.shown.table import Parts, Table
 from excite_cli.summary.cells import figure, percent
+
+# Thresholds of a collision detector in words and as a table.
+
+
+def thresholds_parts(found: Thresholds) -> Parts:
+    """Level and coefficients of every joint."""
+    figures = zip(found.joint_names, found.level, found.coefficients, strict=True)
+    rows = tuple((name, *(f"{x:.4g}" for x in (level, *c))) for name, level, c in figures)
+    columns = ("joint", "level", "c0", "c1", "c2", "c3")
+    return [_in_words(found), Table("", columns, rows, left=("joint",))]
+
+
+def _in_words(found: Thresholds) -> str:
+    return (
+        f"{len(found.joint_names)} joints, {found.false_alarms:.3g} false alarms an hour, "
+        f"time constant {found.time_constant:.3g} s"
+    )
+
+
+show(Thresholds, _in_words, thresholds_parts)
+
 
 _TOLD = 3  # runs in the sentence
 

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from excite_cli.shown.answer import Answer
-from excite_cli.shown.table import Table
+from excite_cli.shown.answer import Answer, Table
 from excite_cli.study.records import TABLE, CaseRecord, row_of
 
 # Shares that are reported in per cent; and columns that are words.

@@ -19,14 +19,15 @@ from typing import Any
 from excite_cli.out_of_core import Spool
 from excite_cli.workers.base import (
     LOSSES,
+    POSSIBLE,
     Function,
     LostWorkersError,
     News,
     Watch,
     Workers,
+    packed,
     unwatched,
 )
-from excite_cli.workers.by_reference import POSSIBLE, packed
 
 # The parent's path of imports comes first, so that a checkout finds itself; until it is set, `-P`
 # keeps the current folder out: a json.py that lies there is no part of us.

@@ -12,7 +12,7 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.effects.sign import sign_of_width
 from excite_cli.errors import ConfigError, FileError
-from excite_cli.excitation.differences import fourth_order_differences
+from excite_cli.excitation.gradient_check import fourth_order_differences
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.stored_model import StoredModel
 from excite_cli.robot.model import Array, Robot, build_robot

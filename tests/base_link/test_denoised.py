@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from excite_cli.base_link.denoised import denoised
+from excite_cli.base_link.state import denoised
 from tests.base_link.stander import Array
 
 STEP = 0.002

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli.campaign.being_written import is_being_written
+from excite_cli.campaign.inbox import is_being_written
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="leases are of Linux")

@@ -4,9 +4,8 @@ import signal
 
 import pytest
 
-from excite_cli.campaign import escalation
-from excite_cli.campaign.escalation import Escalation
-from excite_cli.campaign.processes import Process
+from excite_cli.campaign import processes
+from excite_cli.campaign.processes import Escalation, Process
 
 INSIDE, OUTSIDE = Process(11, 10, "play", start=1), Process(12, 12, "daemon", start=1)
 
@@ -17,8 +16,8 @@ class Bench:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now, self.running = 0.0, [INSIDE, OUTSIDE]
         self.sent: list[tuple[int, tuple[int, ...]]] = []
-        monkeypatch.setattr(escalation.time, "monotonic", lambda: self.now)
-        monkeypatch.setattr(escalation, "send_to_all", self._note)
+        monkeypatch.setattr(processes.time, "monotonic", lambda: self.now)
+        monkeypatch.setattr(processes, "send_to_all", self._note)
         self.ending = Escalation(lambda: self.running, 10, 5.0)
 
     def _note(self, processes: list[Process], group: int, number: int) -> None:

@@ -15,10 +15,10 @@ from excite_cli.checks.sentences import BELONG
 from excite_cli.checks.set_up import _candidates
 from excite_cli.checks.setup import Setup
 from excite_cli.checks.textbook_fit import TextbookFit
-from excite_cli.config.amended import with_values
+from excite_cli.config.commented_yaml import with_values
 from excite_cli.config.load import load_spec, spec_of
 from excite_cli.config.spec import Spec
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
+from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing

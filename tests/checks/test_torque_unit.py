@@ -11,7 +11,7 @@ from excite_cli.api.loading import Case, load_data
 from excite_cli.checks.look import check_dataset
 from excite_cli.config.load import load_spec
 from excite_cli.config.spec import Spec
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
+from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Dataset, Finding, Run

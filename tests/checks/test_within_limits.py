@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from excite_cli.checks.samples import Samples
+from excite_cli.checks.set_up import beyond_limits
 from excite_cli.checks.setup import Setup
-from excite_cli.checks.within_limits import beyond_limits
 from excite_cli.robot.model import Robot
 from tests.simulation.arms import arm
 

@@ -8,7 +8,6 @@ import typer.main
 from excite_cli.api.exporting import MODELS
 from excite_cli.api.showing import Answer, Table
 from excite_cli.cli.app import app
-from excite_cli.cli.best_so_far import Best
 from excite_cli.cli.completion import (
     MODEL_FORMATS,
     MOTION_FORMATS,
@@ -19,6 +18,7 @@ from excite_cli.cli.completion import (
 )
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.ending import run_guarded
+from excite_cli.cli.start_line import Best
 from excite_cli.errors import FileError
 from excite_cli.excitation.progress import Figure, Measure, Progress, Stage
 from excite_cli.export.motions import MOTION_EXPORTERS

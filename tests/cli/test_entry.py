@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from excite_cli.api.entering import start_posture
-from excite_cli.cli.posture import start_from
+from excite_cli.cli.options import start_from
 from excite_cli.config.load import load_spec
 from excite_cli.errors import ConfigError
 from excite_cli.robot.model import build_robot

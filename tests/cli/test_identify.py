@@ -11,7 +11,7 @@ from excite_cli.config.load import load_spec
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.measurement.hdf5_writer import write_dataset
 from excite_cli.robot.model import Robot, build_robot
-from excite_cli.simulation.true_robot import true_inertias
+from excite_cli.simulation.build import true_inertias
 from tests.cli.program import SMOKE, Program
 from tests.identification.synthetic import measured
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
+from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.measurement.hdf5_writer import write_dataset
 from excite_cli.robot.model import Robot

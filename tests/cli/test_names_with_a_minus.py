@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from excite_cli.cli.app import app, main
-from excite_cli.shown import command
+from excite_cli.shown import answer
 from tests.cli.program import BRIEF, ROOT, SMOKE, Program
 from tests.cli.test_suggestions import told
 
@@ -102,8 +102,8 @@ def test_files_and_joints_with_a_minus_go_through(excite: Program) -> None:
 
 
 def test_a_suggested_command_can_be_pasted() -> None:
-    assert command.as_word("-lead.yaml") == "./-lead.yaml"
-    assert command.as_word("arm.yaml") == "arm.yaml"
-    assert command.as_word("./-lead.yaml") == "./-lead.yaml"
-    words = ("excite", "optimize", command.as_word("-my arm.yaml"))
-    assert command.Command(words).line == "excite optimize './-my arm.yaml'"
+    assert answer.as_word("-lead.yaml") == "./-lead.yaml"
+    assert answer.as_word("arm.yaml") == "arm.yaml"
+    assert answer.as_word("./-lead.yaml") == "./-lead.yaml"
+    words = ("excite", "optimize", answer.as_word("-my arm.yaml"))
+    assert answer.Command(words).line == "excite optimize './-my arm.yaml'"

@@ -9,7 +9,7 @@ import pytest
 from excite_cli.config.load import load_spec
 from excite_cli.measurement.hdf5_writer import write_dataset
 from excite_cli.robot.model import build_robot
-from excite_cli.simulation.true_robot import true_inertias
+from excite_cli.simulation.build import true_inertias
 from excite_cli.store.result_file import read_result
 from tests.cli.program import SMOKE, Program
 from tests.identification.synthetic import measured

@@ -1,6 +1,6 @@
 """A config with some values changed keeps its comments."""
 
-from excite_cli.config.amended import amended, changed_values, with_values
+from excite_cli.config.commented_yaml import amended, changed_values, with_values
 from excite_cli.config.load import parse_spec
 
 TEXT = """\

@@ -8,11 +8,9 @@ import pytest
 from excite_cli.config import (
     constraints_spec,
     data_spec,
-    identified_spec,
     robot_spec,
     spec,
     trajectory_spec,
-    uncertainty_spec,
     wrench_spec,
 )
 from excite_cli.config.load import MAX_BYTES, load_spec, parse_spec
@@ -75,17 +73,17 @@ LEVELS: dict[str, tuple[str, type[Section]]] = {
     ),
     "identified": (
         f"{ROBOT}\nidentified: {{inertias: {{}}, @: 1}}",
-        identified_spec.IdentifiedSpec,
+        spec.IdentifiedSpec,
     ),
     "identified.effects.0": (
         f"{ROBOT}\nidentified: {{inertias: {{}}, "
         "effects: [{kind: spring, joints: [elbow], values: [1, 0], @: 1}]}",
-        identified_spec.IdentifiedEffectSpec,
+        spec.IdentifiedEffectSpec,
     ),
-    "uncertainty": (f"{ROBOT}\nuncertainty: {{@: 1}}", uncertainty_spec.UncertaintySpec),
+    "uncertainty": (f"{ROBOT}\nuncertainty: {{@: 1}}", spec.UncertaintySpec),
     "uncertainty.bodies.elbow": (
         f"{ROBOT}\nuncertainty: {{bodies: {{elbow: {{@: 1}}}}}}",
-        uncertainty_spec.BodyUncertaintySpec,
+        spec.BodyUncertaintySpec,
     ),
     "robot.payload": (
         "robot: {urdf: arm.urdf, payload: {link: hand, start: [0, 0, 0], end: [0, 0, 1], "

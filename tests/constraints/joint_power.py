@@ -6,8 +6,8 @@ Together with a line in the catalogue this file is all that it takes.
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
+from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.robot.model import Robot
 
 

@@ -15,17 +15,16 @@ from excite_cli.config.constraints_spec import (
     TorqueSpec,
 )
 from excite_cli.config.robot_spec import JointLimits, RobotSpec, TransmissionSpec
-from excite_cli.config.uncertainty_spec import UncertaintySpec
+from excite_cli.config.spec import UncertaintySpec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.catalogue import build_constraints
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.center_of_mass import CenterOfMass
-from excite_cli.dynamics.forward_kinematics import BatchKinematics
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
+from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.dynamics.uncertain_inertias import inertia_uncertainty
 from excite_cli.errors import ConfigError
-from excite_cli.excitation.differences import central_differences
+from excite_cli.excitation.gradient_check import central_differences
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.enclosed_trajectory import enclosed_states, intervals_of
 from excite_cli.robot.model import Robot, build_robot

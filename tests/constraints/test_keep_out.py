@@ -10,12 +10,11 @@ from hypothesis import strategies as st
 from excite_cli.config.load import load_spec
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.constraints.keep_out import KeepOut, build_keep_out
-from excite_cli.dynamics.forward_kinematics import BatchKinematics
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.excitation.admissible import fine_times
-from excite_cli.excitation.differences import central_differences
 from excite_cli.excitation.generate import generate_motion
+from excite_cli.excitation.gradient_check import central_differences
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack

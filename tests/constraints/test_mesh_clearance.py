@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from excite_cli.constraints.mesh_clearance import MeshClearance
-from excite_cli.dynamics.forward_kinematics import BatchKinematics
-from excite_cli.dynamics.states import States
-from excite_cli.excitation.differences import central_differences, relative_error
+from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
+from excite_cli.excitation.gradient_check import central_differences, relative_error
 from excite_cli.geometry.pair_table import PairTable
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.enclosed_trajectory import enclosed_states, intervals_of

@@ -8,12 +8,11 @@ import pytest
 
 from excite_cli.config.load import load_spec
 from excite_cli.constraints.obstacle_clearance import Surroundings
-from excite_cli.dynamics.forward_kinematics import BatchKinematics
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.admissible import fine_times, worst_margins
-from excite_cli.excitation.differences import central_differences
 from excite_cli.excitation.generate import generate_motion
+from excite_cli.excitation.gradient_check import central_differences
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.solvers.interior_point import InteriorPoint

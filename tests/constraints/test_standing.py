@@ -7,8 +7,7 @@ import pytest
 
 from excite_cli.api.loading import load_problem
 from excite_cli.constraints.base import Constraint
-from excite_cli.dynamics.forward_kinematics import BatchKinematics
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.excitation.admissible import verdicts
 from excite_cli.excitation.problem import Problem
 from excite_cli.proof.enclosed_motion import EnclosedMotion

@@ -22,8 +22,8 @@ from excite_cli.constraints.catalogue import build_constraints
 from excite_cli.constraints.ground_contact import ZeroMomentPoint
 from excite_cli.constraints.joint_torque import JointTorque
 from excite_cli.dynamics.base_parameters import find_base_parameters
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.dynamics.rigid_body import RigidBody
-from excite_cli.dynamics.states import States
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty, box, inertia_uncertainty
 from excite_cli.dynamics.whole_robot import drawn_states, whole_parameters
 from excite_cli.errors import ConfigError

@@ -10,7 +10,7 @@ from excite_cli.criteria.catalogue import CRITERIA, build_criterion
 from excite_cli.criteria.condition_number import ConditionNumber
 from excite_cli.criteria.smooth_condition_number import SmoothConditionNumber
 from excite_cli.errors import ConfigError
-from excite_cli.excitation.differences import central_differences, relative_error
+from excite_cli.excitation.gradient_check import central_differences, relative_error
 
 
 def test_unknown_kind_suggests_the_nearest() -> None:

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from excite_cli.config.load import load_spec
-from excite_cli.diagnosis.absorbed import absorbed_effects
+from excite_cli.diagnosis.aliases import absorbed_effects
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.declared_model import Model
+from excite_cli.diagnosis.modelled_run import Model
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.records import Absorbed
 from excite_cli.diagnosis.schur import ABSORBED

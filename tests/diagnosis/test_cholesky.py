@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.cholesky import Cholesky
+from excite_cli.diagnosis.schur import Cholesky
 
 
 @pytest.mark.parametrize("size", [1, 2, 30])

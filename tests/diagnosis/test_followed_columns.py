@@ -14,9 +14,9 @@ import pytest
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.load import load_spec, spec_as_yaml
 from excite_cli.config.spec import Spec
-from excite_cli.diagnosis.change_words import changes_in_words
 from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.diagnosis.records import Diagnosis, NamedEffect
+from excite_cli.diagnosis.words import changes_in_words
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.errors import ConfigError

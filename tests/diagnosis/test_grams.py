@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.grams import Grams, JointGram
+from excite_cli.diagnosis.evidence import Grams, JointGram
 
 FOLDS, SIZE = 3, 7
 

@@ -19,7 +19,7 @@ from excite_cli.diagnosis.search import Search
 from excite_cli.diagnosis.tracing import _usual
 from excite_cli.effects.base import Effect, Signals, Tier
 from excite_cli.effects.catalogue import catalogue
-from excite_cli.identification.left_out import LeftOut
+from excite_cli.identification.declared_states import LeftOut
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array
 from tests.diagnosis.explicit_data import anything, effect

@@ -11,7 +11,7 @@ from excite_cli.diagnosis import tracing
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.effects.catalogue import catalogue
-from excite_cli.identification.left_out import LeftOut
+from excite_cli.identification.declared_states import LeftOut
 from tests.diagnosis.explicit_data import anything, effect
 from tests.diagnosis.test_doubt import planted
 

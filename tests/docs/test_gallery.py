@@ -9,8 +9,7 @@ import pytest
 from docs.gallery_page import Diagnosed, as_markdown, escaped, left_of, page
 from docs.make_gallery import LARGEST, ROBOTS, TARGET
 from excite_cli.measurement.dataset import Dataset, Finding, Run
-from excite_cli.shown.command import Command
-from excite_cli.shown.table import Table
+from excite_cli.shown.answer import Command, Table
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis
 from tests.docs.test_links import broken
 

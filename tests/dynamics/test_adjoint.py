@@ -10,7 +10,7 @@ from excite_cli.dynamics.adjoint import FictitiousInertiaAdjoint
 from excite_cli.dynamics.block_form import block_pull_back
 from excite_cli.dynamics.regressor import Regressor
 from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint
-from excite_cli.excitation.differences import relative_error
+from excite_cli.excitation.gradient_check import relative_error
 from excite_cli.robot.model import Robot, build_robot
 from tests.robot.coupled_robots import CLAW, HAND, coupled_robot
 from tests.robot.random_robots import random_robot

@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.dynamics.center_of_mass import CenterOfMass
-from excite_cli.dynamics.forward_kinematics import BatchKinematics
-from excite_cli.dynamics.states import States
-from excite_cli.excitation.differences import central_differences, relative_error
+from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
+from excite_cli.excitation.gradient_check import central_differences, relative_error
 from excite_cli.robot.model import Robot, build_robot
 from tests.robot.random_robots import random_robot
 

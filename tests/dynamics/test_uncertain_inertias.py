@@ -12,7 +12,7 @@ from scipy.sparse import csc_matrix
 
 from benchmarks.uncertain_bodies import drawn_bodies
 from excite_cli.config.robot_spec import RobotSpec
-from excite_cli.config.uncertainty_spec import BodyUncertaintySpec, UncertaintySpec
+from excite_cli.config.spec import BodyUncertaintySpec, UncertaintySpec
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.dynamics.least_ratio import least_ratios
 from excite_cli.dynamics.regressor import Regressor
@@ -26,7 +26,7 @@ from excite_cli.dynamics.uncertain_inertias import (
 )
 from excite_cli.dynamics.whole_robot import GroundWrench, drawn_states, whole_parameters
 from excite_cli.errors import ConfigError, FileError
-from excite_cli.excitation.differences import central_differences
+from excite_cli.excitation.gradient_check import central_differences
 from excite_cli.robot.model import Array, Robot, build_robot
 from tests.robot.random_robots import random_robot
 

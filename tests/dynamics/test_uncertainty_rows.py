@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 
 from benchmarks.whole_plant import WholePlant
 from excite_cli.dynamics.center_of_mass import CenterOfMass
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
-from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.regressor import InverseDynamics, standard_parameters
 from excite_cli.dynamics.row_adjoint import RowAdjoint
 from excite_cli.dynamics.whole_robot import GroundWrench, drawn_states, whole_parameters
 from excite_cli.robot.model import Robot

@@ -6,7 +6,7 @@ import pytest
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.effects.dahl_friction import DahlFriction, _Bristle
-from excite_cli.excitation.differences import fourth_order_differences, relative_error
+from excite_cli.excitation.gradient_check import fourth_order_differences, relative_error
 from excite_cli.robot.model import Array, Robot
 from tests.effects.motions import signals_at
 from tests.robot.random_robots import random_robot

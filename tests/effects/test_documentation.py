@@ -11,7 +11,7 @@ from excite_cli.config.data_spec import EffectSpec
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue, declared_effects
 from excite_cli.effects.sign import sign_of_width
-from excite_cli.excitation.differences import central_differences, relative_error
+from excite_cli.excitation.gradient_check import central_differences, relative_error
 from excite_cli.robot.model import Array
 from tests.effects import own_package
 from tests.effects.motions import signals_at, signals_of, states

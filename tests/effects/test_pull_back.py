@@ -9,7 +9,7 @@ from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint
 from excite_cli.effects.base import Cotangents, Effect, Signals
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.effects.sign import sign_of_width
-from excite_cli.excitation.differences import fourth_order_differences, relative_error
+from excite_cli.excitation.gradient_check import fourth_order_differences, relative_error
 from excite_cli.robot.model import Array, Robot
 from tests.effects.motions import signals_at, states
 from tests.robot.random_robots import random_robot

@@ -16,7 +16,7 @@ from excite_cli import (
     write_dataset,
 )
 from excite_cli.excitation.problem import Problem
-from excite_cli.measurement.hdf5_file import new_hdf5
+from excite_cli.measurement.hdf5_writer import new_hdf5
 from excite_cli.proposal.propose import Request, propose
 from excite_cli.robot.model import Array
 from excite_cli.simulation.simulate import Simulation

@@ -12,8 +12,8 @@ from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.excitation.admissible import smallest_margins
 from excite_cli.excitation.base_motion import base_motion
 from excite_cli.excitation.boundary import boundary_between, posture_of, straight_motion
-from excite_cli.excitation.differences import central_differences, relative_error
 from excite_cli.excitation.generate import generate_motion
+from excite_cli.excitation.gradient_check import central_differences, relative_error
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.random_baseline import random_baseline
 from excite_cli.excitation.solvers.interior_point import InteriorPoint

@@ -8,7 +8,6 @@ from excite_cli.criteria.sigma_min import SigmaMin, SmoothSigmaMin
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
-from excite_cli.excitation.differences import fourth_order_differences, relative_error
 from excite_cli.excitation.discrimination import (
     SEPARATED,
     Direction,
@@ -19,6 +18,7 @@ from excite_cli.excitation.discrimination import (
     residual_directions,
 )
 from excite_cli.excitation.extension import extend
+from excite_cli.excitation.gradient_check import fourth_order_differences, relative_error
 from excite_cli.excitation.progress import Measure
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import build_weighting

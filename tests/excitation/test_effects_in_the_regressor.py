@@ -18,10 +18,13 @@ from excite_cli.effects.catalogue import catalogue
 from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.errors import ConfigError, FileError
-from excite_cli.excitation.differences import fourth_order_differences, relative_error
 from excite_cli.excitation.effect_columns import EffectColumns
 from excite_cli.excitation.extension import extend
-from excite_cli.excitation.gradient_check import check_gradient
+from excite_cli.excitation.gradient_check import (
+    check_gradient,
+    fourth_order_differences,
+    relative_error,
+)
 from excite_cli.excitation.objective import Objective
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.run import continue_run, new_result

@@ -8,7 +8,7 @@ import pytest
 
 from excite_cli.config.load import load_spec
 from excite_cli.config.trajectory_spec import BSplineSpec
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.excitation import path_search
 from excite_cli.excitation.connection import State, joined_states, judge_of

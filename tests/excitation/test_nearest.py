@@ -7,7 +7,7 @@ import pytest
 
 from excite_cli.config.load import load_spec
 from excite_cli.constraints.self_collision import SelfCollision
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.excitation.nearest import closest_time, nearest_bodies
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.geometry.coal_distances import CoalDistances

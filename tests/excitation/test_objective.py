@@ -9,7 +9,7 @@ from excite_cli.config.spec import CriterionSpec
 from excite_cli.criteria.catalogue import CRITERIA, build_criterion
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.block_form import block_pull_back
-from excite_cli.excitation.differences import fourth_order_differences, relative_error
+from excite_cli.excitation.gradient_check import fourth_order_differences, relative_error
 from excite_cli.excitation.objective import Objective
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import build_weighting

@@ -17,8 +17,7 @@ from excite_cli.excitation.motion import Outcome
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.progress import Measure, Progress, Status
 from excite_cli.excitation.solvers.base import Effort, Solver
-from excite_cli.excitation.solvers.interior_point import InteriorPoint
-from excite_cli.excitation.solvers.quasi_newton import damped_update
+from excite_cli.excitation.solvers.interior_point import InteriorPoint, damped_update
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import clear_posture, random_start
 from excite_cli.excitation.task import MotionTask

@@ -11,7 +11,7 @@ from excite_cli.errors import RobotError
 from excite_cli.export.mjcf import mjcf
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.robot.model import Array, Robot, build_robot
-from excite_cli.simulation.true_robot import true_inertias
+from excite_cli.simulation.build import true_inertias
 from tests.robot.coupled_robots import CLAW, HAND, coupled_robot
 from tests.robot.random_robots import random_robot
 

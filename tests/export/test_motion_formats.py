@@ -10,8 +10,7 @@ import pytest
 import yaml
 
 from excite_cli.errors import ConfigError, FileError, MissingExtraError
-from excite_cli.export.joint_trajectory import joint_trajectory
-from excite_cli.export.motion_exporter import MotionExporter
+from excite_cli.export.motion_exporter import MotionExporter, joint_trajectory
 from excite_cli.export.motion_rosbag2 import message_of
 from excite_cli.export.motions import MOTION_EXPORTERS
 from excite_cli.export.timed import instants, repeated, timed_motion

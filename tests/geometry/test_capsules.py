@@ -9,8 +9,13 @@ from excite_cli.config.constraints_spec import CapsuleSpec, SelfCollisionSpec
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.geometry import capsules as module
-from excite_cli.geometry.capsule_cache import _content, cover_key, store_capsules
-from excite_cli.geometry.capsules import fit_capsules, link_joints
+from excite_cli.geometry.capsules import (
+    _content,
+    cover_key,
+    fit_capsules,
+    link_joints,
+    store_capsules,
+)
 from excite_cli.geometry.link_shapes import collision_model, link_shapes, placed_shapes
 from excite_cli.robot.model import build_robot
 

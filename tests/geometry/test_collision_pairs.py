@@ -5,11 +5,10 @@ import numpy as np
 import pytest
 
 from excite_cli.config.constraints_spec import SelfCollisionSpec
+from excite_cli.constraints.self_collision import Clearance
 from excite_cli.geometry import collision_pairs
-from excite_cli.geometry.clearance import Clearance
 from excite_cli.geometry.collision_pairs import CollisionPairs, choose_pairs
-from excite_cli.geometry.reasons import Why
-from excite_cli.geometry.words import reason_in_words
+from excite_cli.geometry.reasons import Why, reason_in_words
 from excite_cli.robot.capsule import Capsule
 
 from .fitted_robots import capsules_of, pairs_of, robot_of

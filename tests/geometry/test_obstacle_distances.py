@@ -6,9 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from excite_cli.dynamics.forward_kinematics import BatchKinematics
-from excite_cli.dynamics.states import States
-from excite_cli.excitation.differences import central_differences
+from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
+from excite_cli.excitation.gradient_check import central_differences
 from excite_cli.geometry.obstacle_distances import ObstacleDistances
 from excite_cli.geometry.obstacles import Box
 from excite_cli.geometry.segment_box import point_distances, segment_contacts, segment_distances

@@ -12,9 +12,8 @@ import pytest
 
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.constraints.mesh_clearance import KEPT, MeshClearance
-from excite_cli.dynamics.forward_kinematics import BatchKinematics
-from excite_cli.dynamics.states import States
-from excite_cli.excitation.differences import central_differences
+from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
+from excite_cli.excitation.gradient_check import central_differences
 from excite_cli.geometry.collision_pairs import CollisionPairs
 from excite_cli.geometry.mesh_distances import MeshDistances
 from excite_cli.geometry.pair_table import PairTable

@@ -4,9 +4,17 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli.geometry.pair_choice_cache import store_reasons, stored_reasons
-from excite_cli.geometry.reasons import DroppedPair, LinksApart, Reason, Standing, Why
-from excite_cli.geometry.words import dropped_in_words, reason_in_words, standing_in_words
+from excite_cli.geometry.collision_pairs import store_reasons, stored_reasons
+from excite_cli.geometry.reasons import (
+    DroppedPair,
+    LinksApart,
+    Reason,
+    Standing,
+    Why,
+    dropped_in_words,
+    reason_in_words,
+    standing_in_words,
+)
 
 APART = (LinksApart("base", "arm", 0.5), LinksApart("base – x", "hand, left", 0.995))
 TOLD = [

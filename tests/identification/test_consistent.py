@@ -15,7 +15,7 @@ from excite_cli.dynamics.regressor import Regressor, standard_parameters
 from excite_cli.identification.consistent import ConsistentParameters, consistent_parameters
 from excite_cli.identification.prior import InertialPrior, inertial_prior
 from excite_cli.robot.model import Array, Robot
-from excite_cli.simulation.true_robot import true_inertias
+from excite_cli.simulation.build import true_inertias
 from tests.robot.random_robots import random_robot
 
 

@@ -22,7 +22,7 @@ from excite_cli.identification.fit import fit
 from excite_cli.identification.prior import inertial_prior
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.robot.model import Array, Robot, build_robot
-from excite_cli.simulation.true_robot import true_inertias
+from excite_cli.simulation.build import true_inertias
 from tests.identification.synthetic import measured, regression_of
 from tests.identification.test_consistent import factor_of
 from tests.robot.random_robots import random_robot

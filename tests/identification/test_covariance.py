@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from excite_cli.identification.covariance import Rows
+from excite_cli.identification.covariance import Rows, noise_of
 from excite_cli.identification.factors import run_factors, solve, stacked
 from excite_cli.identification.least_squares import LinearFit, fit_rows
-from excite_cli.identification.noise import noise_of
 
 JOINTS, COLUMNS, SAMPLES = 3, 6, 1000
 

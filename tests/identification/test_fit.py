@@ -15,7 +15,7 @@ from excite_cli.identification.fit import Fit, essential, fit
 from excite_cli.identification.identify import judged
 from excite_cli.identification.regression import follows_model, rebuilt
 from excite_cli.robot.model import Array, Robot
-from excite_cli.simulation.true_robot import true_inertias
+from excite_cli.simulation.build import true_inertias
 from tests.identification.synthetic import measured, regression_of
 from tests.robot.random_robots import random_robot
 

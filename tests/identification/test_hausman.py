@@ -5,8 +5,8 @@ import pytest
 from scipy.signal import lfilter
 
 from excite_cli.identification.covariance import Rows
-from excite_cli.identification.exact_period import exact_period
 from excite_cli.identification.hausman import hausman_test, instrument_dataset
+from excite_cli.identification.noise_floor import exact_period
 from excite_cli.measurement.dataset import Dataset, Run
 
 SAMPLES, JOINTS, COLUMNS = 800, 2, 4

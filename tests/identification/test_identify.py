@@ -14,7 +14,7 @@ from excite_cli.errors import ConfigError
 from excite_cli.identification.identify import Identification, identify
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.robot.model import Array, Robot
-from excite_cli.simulation.true_robot import true_inertias
+from excite_cli.simulation.build import true_inertias
 from tests.identification.synthetic import measured
 from tests.robot.random_robots import random_robot
 

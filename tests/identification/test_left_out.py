@@ -4,7 +4,7 @@ import numpy as np
 
 from excite_cli.config.data_spec import FilterSpec
 from excite_cli.effects.catalogue import kind_named
-from excite_cli.identification.left_out import LeftOut
+from excite_cli.identification.declared_states import LeftOut
 from excite_cli.identification.prepare import prepare
 from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.dataset import Run

@@ -14,8 +14,12 @@ from excite_cli.identification.identify import Identification, identify
 from excite_cli.identification.link_changes import LinkChange, inertial_covariance, link_changes
 from excite_cli.identification.prior import InertialPrior, inertial_prior
 from excite_cli.robot.model import Array, Robot, build_robot
-from excite_cli.summary.identification import identification_answer, identification_parts
-from excite_cli.summary.link_changes import link_data, link_parts
+from excite_cli.summary.identification import (
+    identification_answer,
+    identification_parts,
+    link_data,
+    link_parts,
+)
 from tests.cli.program import SMOKE
 
 pytest.importorskip("mujoco")

@@ -22,7 +22,7 @@ from excite_cli.config.data_spec import EffectSpec
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.identification.load import expected_load
-from excite_cli.identification.stored_fit import StoredFit
+from excite_cli.identification.stored_model import StoredFit
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.store.fit_file import read_fit
 from excite_cli.summary.load import load_answer

@@ -12,9 +12,8 @@ from excite_cli.config.load import load_spec, parse_spec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import kind_named
-from excite_cli.identification.exact_period import exact_period
 from excite_cli.identification.identify import identify
-from excite_cli.identification.noise_floor import noise_floor
+from excite_cli.identification.noise_floor import exact_period, noise_floor
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.split import split
 from excite_cli.measurement.dataset import Dataset, Run

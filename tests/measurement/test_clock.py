@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from excite_cli.measurement.clock import check_clock
 from excite_cli.measurement.dataset import Run
 from excite_cli.measurement.run_identity import RunId
+from excite_cli.measurement.speeds import check_clock
 
 
 def _run(step: float, gain: float) -> Run:

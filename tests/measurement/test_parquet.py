@@ -80,7 +80,7 @@ def test_a_new_process_reads_within_the_limit_of_memory(tmp_path: Path) -> None:
     """In this one, the library has its memory from writing."""
     path = write_dataset(tmp_path / "set", LAYOUTS["torques in the state"])
     program = (
-        "from pathlib import Path; from excite_cli.measurement.parquet_table import read_parquet; "
+        "from pathlib import Path; from excite_cli.measurement.parquet_reader import read_parquet; "
         f"print(read_parquet(Path({str(path)!r})).columns['observation.state'].shape)"
     )
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)

@@ -8,8 +8,7 @@ import pytest
 
 from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Dataset, Finding, Run
-from excite_cli.measurement.quality import raise_for_errors, sentence
-from excite_cli.measurement.saturation import mask_saturated
+from excite_cli.measurement.quality import mask_saturated, raise_for_errors, sentence
 from excite_cli.measurement.speed_lag import speed_lag
 from tests.measurement.recordings import JOINTS, check, only, recorded, without_speed
 

@@ -5,7 +5,7 @@ import pytest
 
 from excite_cli.measurement.dataset import Array, Run
 from excite_cli.measurement.limits import Limits
-from excite_cli.measurement.wrapped import unwrapped
+from excite_cli.measurement.quality import unwrapped
 
 T = np.arange(1000) * 0.01
 TRUE = 2.5 + 1.5 * np.sin(2 * T)

@@ -10,12 +10,10 @@ from excite_cli.api.loading import load_problem
 from excite_cli.config.load import parse_spec, spec_as_yaml
 from excite_cli.criteria.base import singular_values
 from excite_cli.excitation.stack import Stack
-from excite_cli.report.assembly import Source, page_of
+from excite_cli.report.assembly import Source, campaign_figures, page_of
 from excite_cli.report.campaign import Campaign, in_figures
-from excite_cli.report.campaign_sections import campaign_figures
-from excite_cli.report.compare_section import comparable, compare_results
+from excite_cli.report.compare_section import comparable, compare_results, differences
 from excite_cli.report.condition_section import condition_chart, condition_section
-from excite_cli.report.config_differences import differences
 from excite_cli.report.margin_section import margin_figures, margin_section
 from excite_cli.report.motion_section import drawn_motions, motion_section
 from excite_cli.report.page import Block, Charts, Choice, Page, Section, Table, Text, render

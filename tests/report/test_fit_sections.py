@@ -10,12 +10,12 @@ from excite_cli.config.load import parse_spec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.identification.identify import identify
-from excite_cli.identification.stored_fit import StoredFit
-from excite_cli.report.fit_parameter_chart import parameter_charts
+from excite_cli.identification.stored_model import StoredFit
 from excite_cli.report.fit_sections import (
     correlated_parameters,
     fit_figures,
     fit_sections,
+    parameter_charts,
     parameter_section,
     time_section,
 )

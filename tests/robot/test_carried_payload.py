@@ -9,10 +9,8 @@ from excite_cli.config.constraints_spec import SelfCollisionSpec
 from excite_cli.config.robot_spec import PayloadSpec, RobotSpec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.center_of_mass import CenterOfMass
-from excite_cli.dynamics.forward_kinematics import BatchKinematics
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
-from excite_cli.dynamics.regressor import payload_parameters, standard_parameters
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
+from excite_cli.dynamics.regressor import InverseDynamics, payload_parameters, standard_parameters
 from excite_cli.errors import ConfigError
 from excite_cli.export.mjcf import mjcf
 from excite_cli.export.urdf import updated_urdf
@@ -21,8 +19,8 @@ from excite_cli.geometry.collision_pairs import choose_pairs
 from excite_cli.geometry.reasons import Why
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.robot.model import Robot, build_robot
+from excite_cli.simulation.build import true_inertias
 from excite_cli.simulation.mujoco_model import build_plant
-from excite_cli.simulation.true_robot import true_inertias
 
 from .random_robots import random_urdf
 

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 
 import pytest
 
-from excite_cli.shown.command import Command
-from excite_cli.shown.html import as_html
+from excite_cli.shown.answer import Command, Table
 from excite_cli.shown.note import Level, Note, log_note, saying
-from excite_cli.shown.record import Shown, show
-from excite_cli.shown.table import Table
+from excite_cli.shown.record import Shown, as_html, show
 
 
 @dataclass(frozen=True, repr=False)

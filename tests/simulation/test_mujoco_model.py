@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 
 from excite_cli.config.robot_spec import RobotSpec
-from excite_cli.dynamics.inverse_dynamics import InverseDynamics
 from excite_cli.dynamics.pseudo_inertia import pseudo_inertias, ten_parameters
-from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.regressor import InverseDynamics, standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.errors import RobotError
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot, build_robot
-from excite_cli.simulation.build import assemble, make
+from excite_cli.simulation.build import assemble, make, true_inertias
 from excite_cli.simulation.mujoco_model import build_plant
-from excite_cli.simulation.true_robot import true_inertias
 from tests.robot.coupled_robots import CLAW, HAND, coupled_robot, urdf_of
 from tests.robot.random_robots import random_robot
 

@@ -13,7 +13,7 @@ from excite_cli.errors import ConfigError, MissingExtraError, RobotError
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Robot
 from excite_cli.simulation.build import Build, make
-from excite_cli.simulation.engine import silent_engine
+from excite_cli.simulation.mujoco_model import silent_engine
 from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.planted import plant
 from excite_cli.simulation.settings import SimulationSettings

@@ -8,8 +8,8 @@ from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.random_baseline import random_baseline
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.run import continue_run, new_result
+from excite_cli.store.own_file import versions
 from excite_cli.store.result_file import write_result
-from excite_cli.store.versions import versions
 
 CONFIG = Path(__file__).resolve().parents[2] / "configs" / "smoke.yaml"
 

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-from excite_cli.shown.table import Table
+from excite_cli.shown.answer import Table
 from excite_cli.summary.campaign import campaign_answer, round_in_words
 from tests.campaign.test_folder import WHOLE
 

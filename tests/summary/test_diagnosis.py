@@ -18,7 +18,7 @@ from excite_cli.diagnosis.records import (
 )
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.effects.base import Value
-from excite_cli.shown.table import Table
+from excite_cli.shown.answer import Table
 from excite_cli.summary.diagnosis import diagnosis_answer
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from excite_cli.scoring.replayed import Replay
-from excite_cli.shown.table import Table
-from excite_cli.summary.replay import replay_parts
+from excite_cli.scoring.records import Replay
+from excite_cli.shown.answer import Table
+from excite_cli.summary.simulation import replay_parts
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from excite_cli.excitation.differences import central_differences, relative_error
+from excite_cli.excitation.gradient_check import central_differences, relative_error
 from excite_cli.trajectory.base import Trajectory
 from excite_cli.trajectory.bspline import BSplineTrajectory
 from excite_cli.trajectory.fourier import FourierTrajectory

@@ -17,7 +17,7 @@ from excite_cli.api.campaigning import Asked, Measure, run_campaign
 from excite_cli.api.comparing import optimized_for
 from excite_cli.campaign.measure import NotMeasuredError, Take
 from excite_cli.errors import FileError
-from excite_cli.excitation.doubt import Doubt
+from excite_cli.excitation.motion import Doubt
 from excite_cli.shown.note import Note
 from tests.trust.conftest import SMOKE, Loop
 from tests.trust.in_process import excite, refused

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.trust.kill_commands import numbers
-from excite_cli.measurement.hdf5_file import new_hdf5
+from excite_cli.measurement.hdf5_writer import new_hdf5
 from tests.cli.program import EXCITE, SMOKE, environment
 
 BRIEF = ("--motions", "1", "--set", "optimizer.max_iterations=4", "--quiet")

@@ -11,9 +11,17 @@ import pytest
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.problem import Problem
 from excite_cli.trajectory.chain import Segment
-from excite_cli.view.browser import Serving, _Player, _server, _stop, play_in_browser
+from excite_cli.view.browser import (
+    Serving,
+    _Player,
+    _server,
+    _stop,
+    joints_html,
+    margins_html,
+    nearest_html,
+    play_in_browser,
+)
 from excite_cli.view.instants import instants_of
-from excite_cli.view.readout import joints_html, margins_html, nearest_html
 from excite_cli.view.scene import build_scene
 from excite_cli.view.stage import Stage, _quaternion
 

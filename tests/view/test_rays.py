@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from excite_cli.errors import MissingExtraError
-from excite_cli.view.lighting import Lights
 from excite_cli.view.rays import Tracer, embree_part
+from excite_cli.view.studio import Lights
 from excite_cli.view.surface import ball_profile, box_triangles, round_triangles, smooth_surface
 
 pytest.importorskip("embreex")

@@ -9,8 +9,7 @@ import pytest
 from excite_cli import identify, load_problem, plan, simulate
 from excite_cli.errors import ConfigError, MissingExtraError, NoAdmissibleMotionError
 from excite_cli.workers.base import News
-from excite_cli.workers.cluster import Cluster, ClusterError
-from excite_cli.workers.environment import Environment, environment
+from excite_cli.workers.cluster import Cluster, ClusterError, Environment, environment
 from tests.api.conftest import SMOKE
 from tests.api.test_on_disk import same
 from tests.workers import work

@@ -3,7 +3,7 @@
 import pytest
 
 from excite_cli.kernels import compiled as kernels
-from excite_cli.workers.environment import environment
+from excite_cli.workers.cluster import environment
 
 
 def test_workers_without_the_compiled_loops_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:

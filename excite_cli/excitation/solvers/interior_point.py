@@ -27,7 +27,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from excite_cli.constraints.base import Array
 from excite_cli.constraints.joint_columns import JointColumns
 from excite_cli.criteria.base import Criterion
-from excite_cli.dynamics.states import States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.motion import Outcome
 from excite_cli.excitation.objective import Spectrum
@@ -39,8 +39,23 @@ from excite_cli.excitation.residuals import (
     summed_per_instant,
 )
 from excite_cli.excitation.solvers.base import CutShortError, Effort, Solver
-from excite_cli.excitation.solvers.quasi_newton import damped_update
 from excite_cli.excitation.task import MotionTask
+
+# Damped BFGS: an update of the Hessian that stays positive definite (Powell 1978).
+
+
+def damped_update(hessian: Array, step: Array, change: Array) -> Array:
+    """BFGS kept positive definite by Powell's damping (Nocedal and Wright 2006, Eq. 18.15)."""
+    image = hessian @ step
+    curvature, bend = float(step @ change), float(step @ image)
+    if bend <= 1e-14:
+        return hessian
+    if curvature < 0.1 * bend:
+        share = 0.9 * bend / (bend - curvature)
+        change = share * change + (1 - share) * image
+        curvature = float(step @ change)
+    return hessian - np.outer(image, image) / bend + np.outer(change, change) / curvature
+
 
 # μ and the share of the criterion's continuation for each stage, and when a stage is done: the
 # merit fell by less than this over the last `_WINDOW` iterations (never less than the tolerance).

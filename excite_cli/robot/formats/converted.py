@@ -24,8 +24,14 @@ from excite_cli import __version__
 from excite_cli.disk_cache import store_arrays, stored_arrays
 from excite_cli.errors import ExciteError, MissingExtraError, RobotError
 from excite_cli.robot.allowed_files import Needed, OutsideError, allowed_files
-from excite_cli.robot.apart import OUT_OF_TIME, command, environment, limit_memory, set_alarm
-from excite_cli.robot.confinement import confine
+from excite_cli.robot.confinement import (
+    OUT_OF_TIME,
+    command,
+    confine,
+    environment,
+    limit_memory,
+    set_alarm,
+)
 from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
 from excite_cli.robot.formats.kept_meshes import is_sound, kept_meshes_folder
 from excite_cli.robot.mesh_trial import MAX_BYTES

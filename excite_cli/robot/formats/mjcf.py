@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from excite_cli.errors import MissingExtraError, RobotError
 from excite_cli.robot.allowed_files import allowed_files
 from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
-from excite_cli.robot.formats.mjcf_ranges import Ranges, compiled
-from excite_cli.robot.formats.mjcf_sources import mjcf_sources
+from excite_cli.robot.formats.mjcf_sources import Ranges, compiled, mjcf_sources
 from excite_cli.robot.formats.urdf_parts import (
     add_inertial,
     add_origin,

@@ -1,0 +1,46 @@
+"""The files of a report stand in the order of the loop."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from excite_cli.api.report_figures import Told, in_order
+from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.excitation.result import Result
+from excite_cli.identification.stored_model import StoredFit
+
+
+def motions(*priors: str) -> Result:
+    """Made on top of `priors`; nothing else is asked of them."""
+    found = object.__new__(Result)
+    object.__setattr__(found, "priors", priors)
+    return found
+
+
+def _ordered(*files: tuple[str, Any]) -> list[str]:
+    told = [Told(Path("here") / name, Path(name).stem, content) for name, content in files]
+    return [each.path.name for each in in_order(told)]
+
+
+def test_motions_then_fits_then_diagnoses_then_what_follows() -> None:
+    assert _ordered(
+        ("next.h5", motions("elsewhere/diagnosis.h5")),
+        ("diagnosis.h5", object.__new__(Diagnosis)),
+        ("fit.h5", object.__new__(StoredFit)),
+        ("more.h5", motions("first.h5")),
+        ("first.h5", motions()),
+    ) == ["first.h5", "more.h5", "fit.h5", "diagnosis.h5", "next.h5"]
+
+
+def test_the_given_order_is_kept_where_nothing_else_decides() -> None:
+    assert _ordered(("b.h5", motions()), ("a.h5", motions())) == ["b.h5", "a.h5"]
+
+
+@pytest.mark.parametrize("prior", ["a.h5", "missing.h5"])
+def test_a_prior_that_is_not_there_or_itself_holds_nothing_up(prior: str) -> None:
+    assert _ordered(("a.h5", motions(prior)), ("b.h5", motions())) == ["a.h5", "b.h5"]
+
+
+def test_a_circle_ends() -> None:
+    assert _ordered(("a.h5", motions("b.h5")), ("b.h5", motions("a.h5"))) == ["a.h5", "b.h5"]

@@ -1,0 +1,119 @@
+"""The friction and rotors that stay beside what was found, and those that surely do not matter."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.diagnosis.judgement import Judgement, Rules
+from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.diagnosis.possible_sizes import PossibleSizes
+from excite_cli.diagnosis.sufficient import those_that_matter, with_everyday
+from excite_cli.diagnosis.tracing import Traced
+from excite_cli.effects.base import Effect, Signals
+from excite_cli.effects.seen import Seen
+from excite_cli.robot.model import Array, Robot, build_robot
+from tests.diagnosis.test_reach import FAST, SLOW, TORQUE, crept, kind, made, usual
+
+WITHOUT_INERTIAS: Any = SimpleNamespace(base=SimpleNamespace(selection=[]), declared=())
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return build_robot(RobotSpec(urdf="example-robot-data:ur5"))
+
+
+def found_with(
+    robot: Robot,
+    seen: Signals,
+    effects: Sequence[Effect],
+    tau: Array,
+    level: float,
+) -> Traced:
+    """The first of these was found, beside noise of this level [N·m]."""
+    data, candidates = made(robot, seen, effects, tau)
+    noise = NoiseModel.white(np.full(robot.n, level))
+    evidence = data.evidence(candidates, noise)
+    seen_sizes = Seen(np.full(robot.n, 9.0), np.ones(robot.n), 1.0)
+    sizes = PossibleSizes(candidates, evidence.covariance, seen_sizes)
+    judge = Judgement(evidence, evidence, candidates, Rules(0.01, 0.01), sizes)
+    return Traced(
+        data, tuple(candidates), noise, judge, (0,), np.zeros(0), (), np.full(robot.n, level),
+        1.0, sizes, WITHOUT_INERTIAS, usual(robot, seen),
+    )  # fmt: skip
+
+
+def noisy(seen: Signals, inertia: float, level: float) -> Array:
+    noise = level * np.random.default_rng(0).normal(size=seen.v.shape)
+    return np.asarray(TORQUE * np.sign(seen.v) + inertia * seen.a + noise)
+
+
+@pytest.mark.parametrize(
+    ("fastest", "inertia", "level", "stays"),
+    [
+        (SLOW, 1.0, 0.1, True),  # much, along another motion
+        (SLOW, 0.1, 0.1, True),  # perhaps: what may be there is next to nothing in these data
+        (FAST, 0.0, 0.1, False),  # it is known to be next to nothing
+        (FAST, 0.003, 0.1, False),  # little, of the torque and of what is left
+        (FAST, 0.003, 1e-3, True),  # little, and much of what is left
+        (FAST, 0.0, 1e-3, False),
+    ],
+)
+def test_a_rotor_stays_unless_it_surely_does_not_matter(
+    robot: Robot, fastest: float, inertia: float, level: float, stays: bool
+) -> None:
+    seen = crept(robot, fastest)
+    given = found_with(
+        robot,
+        seen,
+        [kind("coulomb_friction"), kind("armature")],
+        noisy(seen, inertia, level),
+        level,
+    )
+    assert with_everyday(given, [0]) == ([0, 1] if stays else [0])
+    assert those_that_matter(given, [0, 1]) == ([0, 1] if stays else [0])
+
+
+def test_what_is_not_of_every_robot_is_left_alone(robot: Robot) -> None:
+    seen = crept(robot, FAST)
+    given = found_with(
+        robot, seen, [kind("coulomb_friction"), kind("spring")], noisy(seen, 0.0, 0.1), 0.1
+    )
+    assert with_everyday(given, [0]) == [0]
+    assert those_that_matter(replace(given, chosen=(0, 1)), [0, 1]) == [0, 1]
+
+
+def test_what_the_chosen_ones_have_among_their_columns_does_not_join(robot: Robot) -> None:
+    seen = crept(robot, SLOW)
+    effects = [kind("asymmetric_friction"), kind("coulomb_friction")]
+    given = found_with(robot, seen, effects, TORQUE * np.sign(seen.v), 1.0)
+    assert with_everyday(given, [0]) == [0]
+
+
+def test_nor_does_an_offset(robot: Robot) -> None:
+    seen = crept(robot, SLOW)
+    effects = [kind("coulomb_friction"), kind("torque_offset")]
+    given = found_with(robot, seen, effects, TORQUE * np.sign(seen.v) + 1.0, 1.0)
+    assert with_everyday(given, [0]) == [0]
+
+
+@pytest.mark.parametrize(("viscous", "stays"), [(-20.0, False), (20.0, True)])
+def test_nor_what_would_be_negative(robot: Robot, viscous: float, stays: bool) -> None:
+    seen = crept(robot, SLOW)
+    effects = [kind("coulomb_friction"), kind("viscous_friction")]
+    tau = TORQUE * np.sign(seen.v) + viscous * seen.v
+    given = found_with(robot, seen, effects, tau, 1e-3)
+    assert with_everyday(given, [0]) == ([0, 1] if stays else [0])
+
+
+def test_others_may_say_the_same_without_it(robot: Robot) -> None:
+    """Two columns that are alike: either leaves, as the other takes all of it."""
+    seen = crept(robot, FAST)
+    effects = [kind("coulomb_friction"), kind("armature"), kind("armature")]
+    given = found_with(robot, seen, effects, noisy(seen, 1.0, 0.1), 0.1)
+    twice = replace(given, chosen=(0, 1, 2))
+    assert len(those_that_matter(twice, twice.chosen)) == 2

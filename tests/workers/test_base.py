@@ -1,0 +1,71 @@
+"""Messages name what lies on disk; it comes back as it was, from its own process or another."""
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from excite_cli.out_of_core import Spool, attached, forget, reference_to
+from excite_cli.workers.base import POSSIBLE, packed
+from excite_cli.workers.processes import Processes
+from tests.workers import work
+
+pytestmark = pytest.mark.skipif(not POSSIBLE, reason="files of other processes need /proc")
+
+
+def test_an_array_on_disk_is_named_and_not_copied() -> None:
+    values = np.random.default_rng(1).normal(size=(400, 30, 3))
+    kept = Spool(room=0).keep(values)
+    for given in (kept, kept[7:300, 4], kept[:, ::7, 1], kept[5, 2, 1:]):
+        message = packed(given)
+        if given.nbytes >= 4096:
+            assert len(message) < 1000
+        found = pickle.loads(message)
+        forget()
+        assert np.array_equal(found, values if given is kept else given)
+        assert found.dtype == given.dtype
+
+
+def test_what_lies_in_memory_goes_to_a_file_only_if_it_is_large() -> None:
+    small, large = np.arange(1000.0), np.arange(100_000.0)
+    spool = Spool(room=0)
+    message = packed((small, large), spool)
+    assert small.nbytes < len(message) < large.nbytes / 10
+    assert reference_to(large) is None
+    for given, found in zip((small, large), pickle.loads(message), strict=True):
+        assert np.array_equal(given, found)
+
+
+def test_a_repeated_value_travels_as_one() -> None:
+    given = np.broadcast_to(2.5, (30_000, 7, 4))
+    for each in (given, given[5:, 1]):
+        message = packed(each, Spool(room=0))
+        assert len(message) < 1000
+        assert np.array_equal(pickle.loads(message), each)
+
+
+def test_large_results_of_a_process_outlive_it() -> None:
+    with Processes(2) as workers:
+        found = workers.map(work.table, 100_000, [1.0, 2.0, 3.0])
+        again = workers.map(work.doubled, None, found)
+    for factor, table, twice in zip((1.0, 2.0, 3.0), found, again, strict=True):
+        assert np.array_equal(table, factor * np.arange(100_000.0))
+        assert np.array_equal(twice, 2.0 * table)
+
+
+def test_part_of_what_a_process_was_given_comes_back() -> None:
+    """Its file is open there only while the task is done."""
+    with Processes(2) as workers:
+        given = workers.map(work.table, 100_000, [1.0, 2.0])
+        found = workers.map(work.second_half, None, given)
+    assert all(
+        np.array_equal(half, whole[50_000:]) for half, whole in zip(found, given, strict=True)
+    )
+
+
+def test_a_file_that_is_gone_is_an_error(tmp_path: Path) -> None:
+    reference = reference_to(Spool(room=0).keep(np.arange(1000.0)))
+    assert reference is not None
+    with pytest.raises(FileNotFoundError):
+        attached(reference)
