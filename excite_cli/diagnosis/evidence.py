@@ -73,6 +73,9 @@ class Grams:
 
 
 _THERE = 1e-5  # of a column's energy: of less in a fold, it is not there
+# Of an effect's energy: with less on one side of the blocks, nothing of it is known from there. A
+# push of half a second is in one block of a second, or in two.
+_LEAST_SIDE = 0.1
 _BY_WEIGHT = 4.0  # times what the data leave: the deviation is half of theirs, or less
 _NEXT_TO_NOTHING = 1e-6  # of a prior's precision
 _KEPT = 6  # projections that are kept: a step of a search asks for the same few again
@@ -266,9 +269,19 @@ class Evidence:
     @cached_property
     def _there(self) -> NDArray[np.bool_]:
         """Which columns (F, K) are there in which fold."""
-        sides = self.grams.seen()
-        energies = sides[::2] + sides[1::2]
+        energies = self._on_sides[::2] + self._on_sides[1::2]
         return np.asarray(energies > _THERE * energies.sum(axis=0))
+
+    def is_brief(self, candidates: Sequence[int]) -> bool:
+        """Whether one of the two sides, blocks of a second in turn, has nearly all of them."""
+        sides = self._on_sides[:, np.concatenate([self.blocks[i] for i in candidates])].sum(axis=1)
+        halves = sides[::2].sum(), sides[1::2].sum()
+        return bool(min(halves) < _LEAST_SIDE * sum(halves))
+
+    @cached_property
+    def _on_sides(self) -> Array:
+        """Energy (2F, K) of every column on every side."""
+        return self.grams.seen()
 
     @cached_property
     def in_turn(self) -> Blocks:

@@ -207,15 +207,23 @@ class Judgement:
             before = e.in_turn.energies(chosen, joints)
             *others, last = added
             after = e.in_turn.with_each([*chosen, *others], [last], joints)[last]
-            gains.append(self._gain(before, after, added))
+            fitted = e.seen.with_each([*chosen, *others], [last], joints)[last]
+            explained = float((e.seen.energies(chosen, joints) - fitted).sum())
+            gains.append(self._gain(before, after, explained, added))
         return max(gains)
 
-    def _gain(self, before: Array, after: Array, added: Sequence[int]) -> float:
-        """1 − the ratio of RMS errors; what single runs carry is judged where it is."""
+    def _gain(self, before: Array, after: Array, explained: float, added: Sequence[int]) -> float:
+        """1 − the ratio of RMS errors; what single runs carry is judged where it is.
+
+        Of what is too brief for any other block to know, with what a fit to all blocks explains.
+        """
         if all(self.candidates[i].effect.runs for i in added):
             there = np.repeat(self.white.folds_of(added), 2)
             before, after = before[:, there], after[:, there]
-        return 1.0 - float(np.sqrt(after.sum() / max(before.sum(), 1e-300)))
+        left = after.sum()
+        if self.white.is_brief(added):
+            left = max(before.sum() - explained, 0.0)
+        return 1.0 - float(np.sqrt(left / max(before.sum(), 1e-300)))
 
     def size(self, chosen: Sequence[int], added: Sequence[int], joints: Sequence[int]) -> float:
         """What `added` explains, as a share of the torque's RMS on the joint where it is most."""
@@ -289,16 +297,19 @@ class Judgement:
     def _worth_of_each(self, chosen: Sequence[int]) -> dict[int, tuple[float, bool]]:
         """Gain of each beside the others on blocks left out, and whether it is large enough."""
         both = [
-            (e.in_turn.without_each(chosen), e.in_turn.energies(chosen))
+            (e.in_turn.without_each(chosen), e.in_turn.energies(chosen), *_seen(e, chosen))
             for e in (self.plain, self.white)
         ]
-        seen, after = self.plain.seen.without_each(chosen), self.plain.seen.energies(chosen)
-        whole = np.array([self.plain.grams.torque_energy(j) for j in range(len(after))])
+        whole = np.array([self.plain.grams.torque_energy(j) for j in range(len(both[0][1]))])
         found = {}
         for i in chosen:
             rows = list(self.white.rows_of[i])
-            gain = max(self._gain(without[i][rows], now[rows], [i]) for without, now in both)
-            explained = np.maximum(seen[i] - after, 0.0)[:, 0] / np.maximum(whole, 1e-300)
+            gain = max(
+                self._gain(without[i][rows], now[rows], float((seen[i] - fitted)[rows].sum()), [i])
+                for without, now, seen, fitted in both
+            )
+            _, _, seen, fitted = both[0]
+            explained = np.maximum(seen[i] - fitted, 0.0)[:, 0] / np.maximum(whole, 1e-300)
             found[i] = gain, bool((np.sqrt(explained) >= rules.SMALLEST).any())
         return found
 
@@ -315,3 +326,8 @@ class Judgement:
         if self.told_by_weight(i, rest):
             return self._weighs_little(i, rest)
         return gain < self.rules.gain or not large
+
+
+def _seen(evidence: Evidence, chosen: Sequence[int]) -> tuple[dict[int, Array], Array]:
+    """Energies (n, 1) that a fit to all rows leaves without each of the chosen, and with all."""
+    return evidence.seen.without_each(chosen), evidence.seen.energies(chosen)

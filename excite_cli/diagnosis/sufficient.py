@@ -2,8 +2,12 @@
 
 What the search named leaves, where it acts on several joints and is missed on one of them at most,
 unless the model with all of that predicts new recordings better (`comparison`). Of this, with the
-friction and rotors of the textbook beside it (`elsewhere`), and the textbook's model the one with
-fewer parameters is the answer, unless the other predicts better by 2 % of the error.
+friction and rotors of the textbook beside it, and the textbook's model the one with fewer
+parameters is the answer, unless the other predicts better by 2 % of the error.
+
+What single runs carry describes these recordings, and no new one is the better predicted for it
+(pushes, and a payload of two runs in three, were left out of the answer so). It stays if seconds
+left out of the same recordings miss it, and is then beside both models that are compared.
 """
 
 from collections.abc import Sequence
@@ -129,10 +133,11 @@ def comparison_of(traced: Traced) -> Comparison:
 
 def sufficient(traced: Traced, models: Comparison) -> list[int]:
     """The candidates found, with what every robot has, or the textbook's."""
-    plain = traced.plain
-    every, found = (
-        with_everyday(traced, some) for some in (traced.chosen, _seen_on_several(traced, models))
-    )
+    several = _seen_on_several(traced, models)
+    single = _of_single_runs(traced, models, several)
+    plain = [*traced.plain, *single]
+    kept = [i for i in several if i in single or not traced.candidates[i].effect.runs]
+    every, found = (with_everyday(traced, some) for some in (traced.chosen, kept))
     if models.difference(found, every).better:
         found = every
     best, larger = sorted((plain, found), key=lambda some: _width(traced, some))
@@ -150,11 +155,29 @@ def _seen_on_several(traced: Traced, models: Comparison) -> list[int]:
             i: judge.white.gain_of(i, found).chi2
             for i in found
             if len(rows := traced.candidates[i].rows) > 1
+            and not judge.white.is_brief([i])
             and not models.missed(found, judge.without(i, found), rows)
         }
         if not doubtful:
             return found
         found = judge.without(min(doubtful, key=doubtful.__getitem__), found)
+
+
+def _of_single_runs(traced: Traced, models: Comparison, found: Sequence[int]) -> list[int]:
+    """What single runs carry, of what was found: seconds left out of the same recordings miss it.
+
+    Or it is too brief for them to know.
+    """
+    judge = traced.judge
+    return [
+        i
+        for i in found
+        if traced.candidates[i].effect.runs
+        and (
+            judge.white.is_brief([i])
+            or models.missed(found, judge.without(i, found), traced.candidates[i].rows)
+        )
+    ]
 
 
 def _width(traced: Traced, some: Sequence[int]) -> int:

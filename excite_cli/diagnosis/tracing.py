@@ -8,7 +8,7 @@ what the pass before it found. Passes may also go round (what is found asks for 
 left out, with which it is lost): then the answer is the pass with the least error on runs left out.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -392,17 +392,34 @@ def _searched(
     A scale that all joints share, or nearly, takes the gains of all: each alone is at odds with the
     inertias.
     """
-    closed = {judge.candidates[i].place for i in differences(judge.candidates, data, model)}
-    search = Search(judge, most, closed, over)
+    open_ = set(differences(judge.candidates, data, model))
+    search = Search(judge, most, over=over)
     if not model.is_weighed:
         chosen = search.run(search.pruned(everyday(judge.candidates)) if most else ())
         if over():  # a pass that was cut short may know less than the one before it
-            return min(chosen, search.pruned(list(judge.found)), key=judge.cost)
-        return chosen
+            chosen = min(chosen, search.pruned(list(judge.found)), key=judge.cost)
+        return _in_both(judge.candidates, chosen, open_)
     chosen = search.run()
     places = {effect.place for effect in scales(model.robot)}
     gains = [i for i, c in enumerate(judge.candidates) if c.place in places]
-    return min(chosen, search.run(gains), key=judge.cost)
+    return _in_both(judge.candidates, min(chosen, search.run(gains), key=judge.cost), open_)
+
+
+def _in_both(
+    candidates: Sequence[Candidate], chosen: Sequence[int], open_: Collection[int]
+) -> list[int]:
+    """The same effects, those by which two recordings differ with one value for both.
+
+    Looked for without them, a joint whose offset had changed was given waves and gains for it.
+    """
+    places = {candidates[i].place for i in chosen}
+    found = [i for i in chosen if i not in open_]
+    for i in chosen:
+        place = candidates[i].place._replace(runs=())
+        if i in open_ and place not in places:
+            found += [k for k, c in enumerate(candidates) if c.place == place][:1]
+            places.add(place)
+    return found
 
 
 def differences(candidates: Sequence[Candidate], data: TrainingData, model: Model) -> Iterator[int]:

@@ -3,6 +3,7 @@
 Six short runs of the smoke arm, the last held out; a few kinds are looked for, to be quick.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -15,7 +16,7 @@ from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.diagnosis.words import changes_in_words
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
-from excite_cli.effects.catalogue import kind_named
+from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION, kind_named
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.robot.model import Robot, build_robot
 from tests.cli.program import SMOKE
@@ -29,7 +30,7 @@ from excite_cli.simulation.simulate import simulate
 from excite_cli.trajectory.fourier import FourierTrajectory
 
 SECONDS, RATE, RUNS = 4.0, 100.0, 6
-YAW, PITCH, ELBOW = range(3)
+YAW, PITCH, ELBOW, _, SLIDE = range(5)
 KINDS = "[viscous_friction,coulomb_friction,torque_offset,torque_gain,friction_change,payload]"
 
 
@@ -62,7 +63,9 @@ def planted(kind: str, joint: int, value: float, *runs: int, **others: float) ->
     return replace(one, effect=replace(one.effect, runs=tuple(f"r{k}" for k in runs)))
 
 
-def measured(robot: Robot, effects: Sequence[Planted], pause: float = 0.0) -> Dataset:
+def measured(
+    robot: Robot, effects: Sequence[Planted], pause: float = 0.0, runs: int = RUNS
+) -> Dataset:
     """With the same dry and viscous friction in all runs, and `effects`."""
     always = [
         planted("coulomb_friction", YAW, 3.0),
@@ -70,7 +73,7 @@ def measured(robot: Robot, effects: Sequence[Planted], pause: float = 0.0) -> Da
         planted("viscous_friction", PITCH, 1.0),
         planted("coulomb_friction", ELBOW, 2.0),
     ]
-    motions = [motion(robot, number) for number in range(1, RUNS + 1)]
+    motions = [motion(robot, number) for number in range(1, runs + 1)]
     settings = SimulationSettings(rate=RATE, lead_in=0.5, pause=pause)
     return simulate(robot, motions, settings, [*always, *effects]).dataset
 
@@ -166,3 +169,46 @@ def test_of_a_robot_that_stays_the_same_nothing_changed(
     assert what(found) == ALWAYS
     assert changes_in_words(found) == []
     assert found.parts == ()
+
+
+def test_a_push_of_a_third_of_a_second_is_found(
+    robot: Robot, base: BaseParameters, spec: Spec
+) -> None:
+    """No other second knows it, nor does another recording."""
+    push = plant(kind_named("contact"), (), 25.0, {"start": 2.1, "end": 2.45})
+    push = replace(push, effect=replace(push.effect, runs=("r2",)))
+    found = diagnose(robot, base, measured(robot, [push]), with_kinds(spec, "contact"))
+    ((contact,), others) = (
+        [e.effect for e in found.effects if (e.effect.kind == "contact") == wanted]
+        for wanted in (True, False)
+    )
+    assert contact.runs == ("r2",)
+    assert {(e.kind, e.joints[0], e.runs) for e in others} == ALWAYS
+
+
+def test_a_load_of_two_runs_in_three_stays_in_the_answer(
+    robot: Robot, base: BaseParameters, spec: Spec
+) -> None:
+    """Each run without its own data, no other run says that it has the load."""
+    load = planted("payload", SLIDE, 1.5, 1, 2)
+    found = diagnose(robot, base, measured(robot, [load], runs=4), spec)
+    assert what(found) - ALWAYS == {("payload", "slide", ("r1", "r2"))}
+    assert found.after.mean_relative_moving < 0.3 * found.before.mean_relative_moving
+
+
+def test_what_two_recordings_differ_by_is_not_taken_for_something_else(
+    robot: Robot, base: BaseParameters, spec: Spec
+) -> None:
+    """Both get one value, and no waves and offsets in its place."""
+    data = measured(robot, [planted("torque_gain", PITCH, 0.1, 1)], runs=3)
+    found = diagnose(robot, base, data, with_kinds(spec, "ripple", "spring", "position_friction"))
+    beyond = {kind for kind, _, _ in what(found)} - {*EVERYDAY, *EVERYDAY_FRICTION}
+    assert beyond == {"torque_gain"}
+    (told,) = [each.text for each in found.findings if each.kind == "runs_differ"]
+    assert re.search(r"torque_gain of shoulder_pitch by [+-]0\.(09|1)", told)
+
+
+def with_kinds(spec: Spec, *kinds: str) -> Spec:
+    """The same, and these kinds are looked for, too."""
+    wider = spec.diagnosis.model_copy(update={"kinds": [*spec.diagnosis.kinds, *kinds]})
+    return spec.model_copy(update={"diagnosis": wider})

@@ -209,6 +209,29 @@ def test_an_effect_of_some_runs_is_judged_where_it_is_on_blocks_in_turn(
         assert judge.left_out_gain(chosen, [4]) == pytest.approx(expected, rel=1e-3)
 
 
+@pytest.mark.parametrize(("samples", "brief"), [(6, True), (50, False)])
+def test_a_push_that_no_other_block_of_a_second_knows_is_judged_by_what_it_explains(
+    samples: int, brief: bool
+) -> None:
+    data, rng = random_data(5), np.random.default_rng(5)
+    columns = [np.zeros((60, 1, 1)) for _ in FOLDS]
+    columns[1][8 : 8 + samples] = rng.normal(size=(samples, 1, 1))
+    tau = [t + 40.0 * c[:, 0] * [1.0, 0.0] for t, c in zip(data.tau, columns, strict=True)]
+    data = replace(data, tau=tuple(tau))
+    push = Candidate(CoulombFriction((0,), {}, ("run_1",)), (0,), tuple(columns))
+    judge = judge_of(data, [push], allowed=anything)
+    rows = rows_of(data, [push], NoiseModel.white(np.ones(2)))
+    assert judge.white.is_brief([0]) == brief
+    before = rows.on_blocks([], new=False)[0, 2:4].sum()
+    explained = rows.energy([], [0]) - rows.energy([0], [0])
+    after = before - explained if brief else rows.on_blocks([0], new=False)[0, 2:4].sum()
+    expected = 1 - np.sqrt(after / before)
+    assert expected > 0.3
+    assert judge.left_out_gain([], [0]) == pytest.approx(expected, rel=1e-3)
+    assert judge.verdict([], [0]) is Verdict.ACCEPTED
+    assert judge.failing([0]) == []
+
+
 def test_size_is_the_share_of_the_torque_of_any_joint_where_it_is_most(
     random_judge: tuple[Judgement, Rows, Rows],
 ) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.diagnosis import sufficient as sufficient_
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.possible_sizes import PossibleSizes
@@ -117,3 +118,32 @@ def test_others_may_say_the_same_without_it(robot: Robot) -> None:
     given = found_with(robot, seen, effects, noisy(seen, 1.0, 0.1), 0.1)
     twice = replace(given, chosen=(0, 1, 2))
     assert len(those_that_matter(twice, twice.chosen)) == 2
+
+
+@pytest.mark.parametrize(
+    ("missed", "brief", "answer"),
+    [(True, False, [2, 1]), (False, True, [2, 1]), (False, False, [2])],
+    [(True, False, [2, 1]), (False, True, [2, 1]), (False, False, [2])],
+)
+def test_what_single_runs_carry_stays_beside_the_textbook_if_its_own_seconds_miss_it(
+    monkeypatch: pytest.MonkeyPatch, missed: bool, brief: bool, answer: list[int]
+) -> None:
+    """Whatever new recordings say, which are predicted best by the textbook's model."""
+    monkeypatch.setattr(sufficient_, "with_everyday", lambda traced, some: list(some))
+    monkeypatch.setattr(sufficient_, "those_that_matter", lambda traced, some: list(some))
+    effects = [kind("spring"), replace(kind("coulomb_friction"), runs=("b",)), kind("armature")]
+    judge: Any = SimpleNamespace(
+        white=SimpleNamespace(is_brief=lambda some: brief),
+        without=lambda i, some: [k for k in some if k != i],
+    )
+    traced: Any = SimpleNamespace(
+        plain=(2,),
+        chosen=(0, 1),
+        judge=judge,
+        candidates=[SimpleNamespace(effect=each, rows=(0,), width=1) for each in effects],
+    )
+    no_better = SimpleNamespace(better=False, of_error=0.0)
+    models: Any = SimpleNamespace(
+        difference=lambda one, other: no_better, missed=lambda chosen, rest, rows: missed
+    )
+    assert sufficient_.sufficient(traced, models) == answer

@@ -5,7 +5,7 @@ from dataclasses import replace
 from excite_cli.campaign.records import Asked, Campaign
 from excite_cli.report.page import render
 from excite_cli.report.rounds_page import rounds_page
-from tests.campaign.test_folder import WHOLE
+from tests.campaign.test_records import WHOLE
 
 
 def test_an_empty_one_is_a_page() -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from excite_cli.shown.answer import Table
 from excite_cli.summary.campaign import campaign_answer, round_in_words
-from tests.campaign.test_folder import WHOLE
+from tests.campaign.test_records import WHOLE
 
 
 def test_the_reason_comes_first_and_seconds_add_up() -> None:
