@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from excite_cli.api.entering import Start, entered, start_posture
+from excite_cli.api.approach import Start, entered, start_posture
 from excite_cli.api.motions import is_motion, motions_of
 from excite_cli.config.constraints_spec import ConstraintsSpec, JointLimitsSpec
 from excite_cli.config.load import parse_spec

@@ -17,7 +17,7 @@ from excite_cli.api.loading import (
 from excite_cli.api.outputs import held, page_path
 from excite_cli.atomic import write_atomically, write_text_atomically
 from excite_cli.checks import rows
-from excite_cli.checks.look import look
+from excite_cli.checks.all_checks import look
 from excite_cli.checks.result import Result
 from excite_cli.checks.sentences import BELONG, written
 from excite_cli.checks.trust import but_trusted, check_names

@@ -23,8 +23,8 @@ from excite_cli.measurement.covariates import with_declared
 from excite_cli.measurement.dataset import Dataset, Finding, merged
 from excite_cli.measurement.motors import motors_of
 from excite_cli.measurement.quality import raise_for_errors
-from excite_cli.robot.glance import describe
 from excite_cli.robot.model import Robot, build_measured_robot, build_robot
+from excite_cli.robot.overview import describe
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.shown.record import Shown, show
 from excite_cli.store.fit_file import read_fit

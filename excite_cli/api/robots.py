@@ -6,8 +6,8 @@ from excite_cli.api.arguments import checked
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import RobotError, nearest
 from excite_cli.robot.description import EXAMPLE_PREFIX, example_robots, is_named
-from excite_cli.robot.glance import DescribedRobot, describe, known_robots
 from excite_cli.robot.model import build_robot
+from excite_cli.robot.overview import DescribedRobot, describe, known_robots
 from excite_cli.shown.answer import Answer
 from excite_cli.summary.robots import robot_answer as robot_answer
 from excite_cli.summary.robots import robots_answer

@@ -50,7 +50,7 @@ class PlayedMotion:
 
 
 @dataclass(frozen=True)
-class Learned:
+class RoundFindings:
     """What the diagnosis after a round says.
 
     Mean relative errors of the torque on the newest motion, which took no part, where joints move:
@@ -78,7 +78,7 @@ class Round:
 
     number: int
     motions: tuple[PlayedMotion, ...]
-    learned: Learned | None = None
+    learned: RoundFindings | None = None
     efficiency: float | None = None
 
     @property

@@ -11,9 +11,9 @@ from scipy.linalg import cholesky
 
 from excite_cli.diagnosis.aliases import aliases_of
 from excite_cli.diagnosis.candidates import record_of
-from excite_cli.diagnosis.doubt import explained
 from excite_cli.diagnosis.final_fit import FinalFit
 from excite_cli.diagnosis.held_out_verdict import Worth
+from excite_cli.diagnosis.misspecification import explained
 from excite_cli.diagnosis.modelled_run import places_of
 from excite_cli.diagnosis.records import (
     Approximation,
@@ -23,7 +23,7 @@ from excite_cli.diagnosis.records import (
     by_joint,
 )
 from excite_cli.diagnosis.schur import SHARED
-from excite_cli.diagnosis.tracing import Traced
+from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.effects.place import Place
 from excite_cli.effects.placing import told_on
 from excite_cli.robot.model import Array
@@ -32,7 +32,7 @@ Rival = tuple[int, EffectRecord]  # a candidate that may stand for an effect, wi
 
 
 def named_effects(
-    traced: Traced,
+    traced: SearchResult,
     final: FinalFit,
     doubts: Mapping[int, Approximation],
     worth: Mapping[int, Worth],
@@ -65,7 +65,7 @@ def named_effects(
             parameters=effect.report_on(
                 robot.sliding, seen @ values, seen @ final.covariance[own, own] @ seen.T
             ),
-            p_value=judge.told_p_value(i, gain),
+            p_value=judge.reported_p_value(i, gain),
             share_of_residual=float(np.clip(share, 0.0, 1.0)),
             gain=float(judge.left_out_gain(rest, [i])),
             aliases=tuple(record for _, record in aliases),
@@ -79,7 +79,7 @@ def named_effects(
     return {i: found[i] for i in order}, rivals
 
 
-def _aliases(traced: Traced, i: int, rest: Sequence[int]) -> list[Rival]:
+def _aliases(traced: SearchResult, i: int, rest: Sequence[int]) -> list[Rival]:
     """What may stand for chosen candidate i beside the rest, with the values that it has then."""
     judge, model = traced.judge, traced.model
 
@@ -97,7 +97,7 @@ def _aliases(traced: Traced, i: int, rest: Sequence[int]) -> list[Rival]:
     return rivals
 
 
-def information_of(traced: Traced, rivals: Sequence[Rival]) -> Information:
+def information_of(traced: SearchResult, rivals: Sequence[Rival]) -> Information:
     """Triangular factor of the training data's columns, whitened, for the next motion."""
     model, effects = traced.model, (*traced.model.declared, *traced.effects)
     unique: dict[Place, Rival] = {}

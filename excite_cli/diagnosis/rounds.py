@@ -6,7 +6,7 @@ import numpy as np
 
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.records import Round, Suspect, by_joint
-from excite_cli.diagnosis.tracing import Traced
+from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.diagnosis.words import joints_in_words
 from excite_cli.robot.model import Array
@@ -14,7 +14,7 @@ from excite_cli.robot.model import Array
 _SUSPECTS = 5
 
 
-def rounds_of(traced: Traced) -> tuple[Round, ...]:
+def rounds_of(traced: SearchResult) -> tuple[Round, ...]:
     """Rounds in the order of what each effect saves; the last one finds nothing more."""
     names, order = traced.model.robot.joint_names, order_of(traced)
     found: list[Round] = []
@@ -26,7 +26,7 @@ def rounds_of(traced: Traced) -> tuple[Round, ...]:
     return tuple(found)
 
 
-def order_of(traced: Traced) -> list[int]:
+def order_of(traced: SearchResult) -> list[int]:
     """The chosen candidates, first what saves most, then what saves most beside it, and so on."""
     order: list[int] = []
     judge, left = traced.judge, set(traced.chosen)
@@ -37,13 +37,13 @@ def order_of(traced: Traced) -> list[int]:
     return order
 
 
-def _words(traced: Traced, i: int) -> str:
+def _words(traced: SearchResult, i: int) -> str:
     effect, joint_names = traced.candidates[i].effect, traced.model.robot.joint_names
     where = joints_in_words([joint_names[j] for j in effect.joints], len(joint_names))
     return f"{effect.kind} on {where}" + (f", by {effect.covariate}" if effect.covariate else "")
 
 
-def _residual(traced: Traced, chosen: Sequence[int]) -> Array:
+def _residual(traced: SearchResult, chosen: Sequence[int]) -> Array:
     """RMS (n,) [N·m] of what the model with the chosen effects leaves of the training torque."""
     x = traced.judge.plain.solve(chosen)
     left = traced.data.residuals(traced.candidates, chosen, x)
@@ -52,7 +52,7 @@ def _residual(traced: Traced, chosen: Sequence[int]) -> Array:
     return np.asarray(np.sqrt(squares / np.maximum(usable.sum(axis=0), 1)))
 
 
-def _suspects(traced: Traced, chosen: list[int], accepted: int | None) -> tuple[Suspect, ...]:
+def _suspects(traced: SearchResult, chosen: list[int], accepted: int | None) -> tuple[Suspect, ...]:
     """The strongest candidates of a round, one per kind and place, the accepted one first."""
     judge, joint_names = traced.judge, traced.model.robot.joint_names
     schur = judge.white.schur(chosen)

@@ -159,7 +159,7 @@ def margin_table(motions: Sequence[Motion]) -> Table:
 
 def outlook_table(outlook: dict[str, Any]) -> Table:
     """What the motions are expected to tell apart."""
-    title = f"Expected divergence ½Δ; from {outlook['told_apart_from']:g} on, distinguished"
+    title = f"Expected divergence ½Δ; from {outlook['distinguished_from']:g} on, distinguished"
     names = ("effect", "indistinguishable from", "so far", "then", "motions needed")
     rows = []
     for pair in outlook["pairs"]:
