@@ -29,7 +29,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.dataset import Dataset, joined, merged
-from excite_cli.report.inspection_page import inspection_page
+from excite_cli.report.assembly import inspection_page
 from excite_cli.report.page import render
 from excite_cli.robot.model import build_robot
 from excite_cli.shown.note import Tell, log_note

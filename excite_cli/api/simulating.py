@@ -28,7 +28,7 @@ from excite_cli.simulation.simulate import Simulation, takes_of
 from excite_cli.simulation.simulate import simulate as simulate_motions
 from excite_cli.store.own_file import versions
 from excite_cli.summary.simulation import simulation_answer as simulation_answer
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 
 # What of the config's measurement section changes neither positions nor torques when it is read.
 _KEPT = {"filter", "topic", "rate", "covariates", "wrench", "base"}

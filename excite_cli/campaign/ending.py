@@ -3,8 +3,7 @@
 from dataclasses import replace
 from math import isfinite
 
-from excite_cli.campaign.records import Campaign
-from excite_cli.campaign.schedule import pace_of
+from excite_cli.campaign.records import Campaign, pace_of
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.diagnosis.words import place_in_words

@@ -30,7 +30,7 @@ from excite_cli.diagnosis.held_out_errors import (
 from excite_cli.diagnosis.held_out_verdict import Worth, worth_on_held_out
 from excite_cli.diagnosis.misspecification import approximations
 from excite_cli.diagnosis.modelled_run import Model, ModelledRun
-from excite_cli.diagnosis.naming import information_of, named_effects
+from excite_cli.diagnosis.naming import information_of, named_effects, order_of, rounds_of
 from excite_cli.diagnosis.own_torque import at_its_own_torque
 from excite_cli.diagnosis.records import (
     CUT_SHORT,
@@ -43,7 +43,6 @@ from excite_cli.diagnosis.records import (
     Textbook,
     by_joint,
 )
-from excite_cli.diagnosis.rounds import order_of, rounds_of
 from excite_cli.diagnosis.search_loop import SearchResult, trace
 from excite_cli.diagnosis.single_runs import (
     assumptions,
@@ -79,7 +78,7 @@ from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.campaign_clock import recorded
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.robot.model import Robot
-from excite_cli.robot.skeleton import skeleton_of
+from excite_cli.robot.tree import skeleton_of
 
 Progress = Callable[[str, int], None]
 # Of 74 logs set up wrongly by little, effects of other names were confirmed in 18 without this.

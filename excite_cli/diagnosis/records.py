@@ -16,7 +16,7 @@ from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.measurement.campaign_clock import Recorded
 from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.model import Array
-from excite_cli.robot.skeleton import Skeleton
+from excite_cli.robot.tree import Skeleton
 from excite_cli.shown.record import Shown
 
 

@@ -19,7 +19,7 @@ from excite_cli.robot.carried_bodies import MovedBodies
 from excite_cli.robot.link_frame import leaves, link_frame, own_link
 from excite_cli.robot.model import Robot, build_robot
 from excite_cli.robot.overview import describe
-from excite_cli.robot.skeleton import skeleton_of
+from excite_cli.robot.tree import skeleton_of
 from tests.robot.coupled_robots import CLAW, HAND, coupled_robot, urdf_of
 
 
