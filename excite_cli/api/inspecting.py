@@ -14,7 +14,8 @@ from excite_cli.api.loading import (
     inputs_of,
     measured_case,
 )
-from excite_cli.api.outputs import held, page_path
+from excite_cli.api.outputs import held
+from excite_cli.api.paths import page_path
 from excite_cli.atomic import write_atomically, write_text_atomically
 from excite_cli.checks import rows
 from excite_cli.checks.all_checks import look

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from excite_cli.api.arguments import checked
-from excite_cli.api.outputs import paths_in, refuse_twice
+from excite_cli.api.paths import paths_in, refuse_twice
 from excite_cli.base_link.rows import with_base
 from excite_cli.checks.bodies import bodies_in_words
 from excite_cli.config.load import files_of_config, load_spec, parse_spec, spec_of

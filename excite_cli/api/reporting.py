@@ -6,7 +6,8 @@ from pathlib import Path
 
 from excite_cli.api.arguments import checked
 from excite_cli.api.loading import rebuilt_problem, with_own_margins
-from excite_cli.api.outputs import held, page_path, paths_in
+from excite_cli.api.outputs import held
+from excite_cli.api.paths import page_path, paths_in
 from excite_cli.api.report_figures import Told, read_files, write_figures
 from excite_cli.atomic import write_text_atomically
 from excite_cli.errors import ConfigError, FileError

@@ -8,7 +8,8 @@ from pathlib import Path
 from excite_cli.api.arguments import checked
 from excite_cli.api.loading import Case, load_data, tell_findings
 from excite_cli.api.model import Model, load_model
-from excite_cli.api.outputs import held, refuse_twice
+from excite_cli.api.outputs import held
+from excite_cli.api.paths import refuse_twice
 from excite_cli.checks.all_checks import look
 from excite_cli.errors import ExciteError, FileError
 from excite_cli.identification.split import split, whole

@@ -6,7 +6,7 @@ friction and rotors of the textbook beside it, and the textbook's model the one 
 parameters is the answer, unless the other predicts better by 2 % of the error.
 
 What single runs carry describes these recordings, and no new one is the better predicted for it
-(pushes, and a payload of two runs in three, were left out of the answer so). It stays if seconds
+(pushes, and a load of two runs in three, were left out of the answer so). It stays if seconds
 left out of the same recordings miss it, and is then beside both models that are compared.
 """
 

@@ -123,7 +123,6 @@ def test_others_may_say_the_same_without_it(robot: Robot) -> None:
 @pytest.mark.parametrize(
     ("missed", "brief", "answer"),
     [(True, False, [2, 1]), (False, True, [2, 1]), (False, False, [2])],
-    [(True, False, [2, 1]), (False, True, [2, 1]), (False, False, [2])],
 )
 def test_what_single_runs_carry_stays_beside_the_textbook_if_its_own_seconds_miss_it(
     monkeypatch: pytest.MonkeyPatch, missed: bool, brief: bool, answer: list[int]
