@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 USER_STAMP := $(VENV)/.installed-for-use
 
-.PHONY: install run plan loop test suite sanitize lint lock floors dist release-check audit docs bench peers trust battery
+.PHONY: install run plan loop test test-all suite sanitize lint lock floors dist release-check audit docs bench peers trust battery
 .PHONY: campaigns loops robots real scoreboard gallery clean
 
 install: $(USER_STAMP)   ## the program alone, with figures, simulation and the view
@@ -26,12 +26,19 @@ loop: $(STAMP)           ## a UR10 with an effect its config does not know, foun
 	$(BIN)/excite report results/motions.h5 results/diagnosis.h5 results/next.h5 \
 	  -o results/report.html --overwrite
 
-test: $(STAMP)           ## lint, types, import directions, all tests
+test: $(STAMP)           ## lint, types, import directions, and the tests that guard a change
 	$(MAKE) -j 2 lint suite
 
+test-all: test           ## the same, with batteries, real logs, notebooks, documents, hostile files
+	$(MAKE) suite TESTS="$(LONG)"
+
+# Whole ways through the program: minutes, and hardly one of them fails alone.
+LONG := tests/benchmarks tests/docs tests/end_to_end tests/examples tests/trust tests/trust_files \
+  tests/cli/test_help_examples.py
+TESTS := tests $(addprefix --ignore ,$(LONG))
 # Every test that starts the program would compile all of it again where nothing is kept of that.
-suite: $(STAMP)          ## all tests alone
-	OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n 2 --dist worksteal -q --durations 15
+suite: $(STAMP)          ## tests alone: those of `make test`, or TESTS
+	OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest $(TESTS) -n 2 --dist worksteal -q --durations 15
 
 sanitize: $(STAMP)       ## the kernels' tests on a build with the address and UB sanitizers (gcc)
 	$(BIN)/python -m pytest -q -rs tests/kernels/test_sanitized.py
