@@ -29,7 +29,7 @@ the first ones, with capsules and tables of meshes yet to be made.
 The list was made before its robots were tried, but for the first; faults of `init` and of formats
 that they showed were mended. The seed is one that nobody had looked at when the program was as it
 is here: two earlier ones (8101 and 2027) had shown three faults of the diagnosis, which were mended
-(`docs/decisions.md`). Nothing that it showed has changed the program."""
+(`docs/decisions/`). Nothing that it showed has changed the program."""
 
 
 def page(found: list[tuple[Source, Record]], listed: list[Source], seed: int) -> str:
