@@ -23,8 +23,8 @@ from excite_cli.effects.catalogue import kind_named
 from excite_cli.measurement.dataset import Array, Dataset
 from excite_cli.scoring.score import Scorer
 from excite_cli.scoring.thresholds import Residual, thresholds_of
+from excite_cli.simulation.ground_truth import plant
 from excite_cli.simulation.planned_motion import PlannedMotion
-from excite_cli.simulation.planted import plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 

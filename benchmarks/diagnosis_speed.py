@@ -25,8 +25,8 @@ from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.robot.model import build_robot
+from excite_cli.simulation.ground_truth import parse_planted
 from excite_cli.simulation.planned_motion import PlannedMotion
-from excite_cli.simulation.planted import parse_planted
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 

@@ -16,7 +16,7 @@ from excite_cli.effects.catalogue import kind_named
 from excite_cli.effects.parameter import Value
 from excite_cli.identification.identify import Identification, identify
 from excite_cli.robot.model import Array
-from excite_cli.simulation.planted import Planted, plant
+from excite_cli.simulation.ground_truth import Planted, plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 

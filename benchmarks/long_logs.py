@@ -25,8 +25,8 @@ from benchmarks.battery.motions import CONFIGS, arm, pool, trajectory
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.measurement.hdf5_writer import write_dataset
+from excite_cli.simulation.ground_truth import parse_planted
 from excite_cli.simulation.planned_motion import PlannedMotion
-from excite_cli.simulation.planted import parse_planted
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 

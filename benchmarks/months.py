@@ -22,8 +22,8 @@ from excite_cli import Case, Changes, compare, identify
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.simulation.covariate_series import CovariateSeries
+from excite_cli.simulation.ground_truth import plant
 from excite_cli.simulation.planned_motion import PlannedMotion
-from excite_cli.simulation.planted import plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 

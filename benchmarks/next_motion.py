@@ -142,7 +142,7 @@ def measured_divergence(case: Case, folder: Path, pair: tuple[str, str]) -> floa
     if the data speak for the wrong one.
     """
     from excite_cli.config.load import load_spec
-    from excite_cli.diagnosis.tracing import Model, trace
+    from excite_cli.diagnosis.search_loop import Model, trace
     from excite_cli.dynamics.base_parameters import find_base_parameters
     from excite_cli.effects.catalogue import declared_effects
     from excite_cli.identification.declared_states import LeftOut

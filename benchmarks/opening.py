@@ -26,8 +26,7 @@ from excite_cli.robot.model import Array
 from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
-from excite_cli.store.fit_file import write_fit
-from excite_cli.store.fit_knowledge import fit_knowledge
+from excite_cli.store.fit_file import fit_knowledge, write_fit
 
 
 def taken(robust: Problem, plain: Problem, coefficients: Array) -> float:

@@ -32,7 +32,7 @@ from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import ExciteError
 from excite_cli.measurement.dataset import Dataset
-from excite_cli.simulation.planted import Planted, parse_planted
+from excite_cli.simulation.ground_truth import Planted, parse_planted
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 

@@ -19,7 +19,7 @@ from benchmarks.campaigns.robots import ROBOTS, robot_of
 from benchmarks.known_payload import friction_of
 from excite_cli import Case, diagnose, replay
 from excite_cli.effects.catalogue import kind_named
-from excite_cli.simulation.planted import plant
+from excite_cli.simulation.ground_truth import plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 

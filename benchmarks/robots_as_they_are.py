@@ -46,7 +46,7 @@ class Outcome:
     index: int
     label: str
     books: tuple[float, ...] = ()
-    told_book: float = np.nan
+    reported_book: float = np.nan
     answer: float = np.nan
     wrong: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
@@ -65,7 +65,7 @@ class Outcome:
             return f"{self.index:4d} {self.label}: {self.failure}"
         books = " ".join(f"{each:.1f}" for each in self.books)
         return (
-            f"{self.index:4d} {self.ratio:5.2f}  {books} | {self.told_book:.1f} -> "
+            f"{self.index:4d} {self.ratio:5.2f}  {books} | {self.reported_book:.1f} -> "
             f"{self.answer:.1f} %  {len(self.names)} names  {self.seconds:.0f} s  {self.label}"
             + (f"  WRONG {', '.join(self.wrong)}" if self.wrong else "")
         )

@@ -38,12 +38,12 @@ if TYPE_CHECKING:
     from excite_cli.api.motions import motions_of as motions_of
     from excite_cli.api.planning import plan as plan
     from excite_cli.api.planning import plan_after as plan_after
+    from excite_cli.api.proposing import describe_robot as describe_robot
     from excite_cli.api.proposing import propose as propose
     from excite_cli.api.proposing import save_proposal as save_proposal
     from excite_cli.api.replaying import replay as replay
     from excite_cli.api.reporting import Report as Report
     from excite_cli.api.reporting import write_report as write_report
-    from excite_cli.api.robots import describe_robot as describe_robot
     from excite_cli.api.scoring import score as score
     from excite_cli.api.scoring import thresholds as thresholds
     from excite_cli.api.simulating import simulate as simulate
@@ -70,7 +70,7 @@ if TYPE_CHECKING:
     from excite_cli.errors import RobotError as RobotError
     from excite_cli.excitation.comparison import Comparison as Comparison
     from excite_cli.excitation.inspection import Inspection as Inspection
-    from excite_cli.excitation.inspections import Inspections as Inspections
+    from excite_cli.excitation.inspection import Inspections as Inspections
     from excite_cli.excitation.motion import Motion as Motion
     from excite_cli.excitation.problem import Problem as Problem
     from excite_cli.excitation.result import Result as Result
@@ -90,7 +90,7 @@ if TYPE_CHECKING:
     from excite_cli.shown.note import Note as Note
     from excite_cli.simulation.settings import SimulationSettings as SimulationSettings
     from excite_cli.simulation.simulate import Simulation as Simulation
-    from excite_cli.trajectory.chain import Segment as Segment
+    from excite_cli.trajectory.fade import Segment as Segment
     from excite_cli.workers.base import Workers as Workers
     from excite_cli.workers.catalogue import open_workers as open_workers
 
@@ -118,10 +118,9 @@ _HOMES = {
     "api.model": ("Model",),
     "api.motions": ("load_motions", "motions_of"),
     "api.planning": ("plan", "plan_after"),
-    "api.proposing": ("propose", "save_proposal"),
+    "api.proposing": ("describe_robot", "propose", "save_proposal"),
     "api.replaying": ("replay",),
     "api.reporting": ("Report", "write_report"),
-    "api.robots": ("describe_robot",),
     "api.scoring": ("score", "thresholds"),
     "api.simulating": ("simulate",),
     "api.studying": ("run_study",),
@@ -141,8 +140,7 @@ _HOMES = {
         "RobotError",
     ),
     "excitation.comparison": ("Comparison",),
-    "excitation.inspection": ("Inspection",),
-    "excitation.inspections": ("Inspections",),
+    "excitation.inspection": ("Inspection", "Inspections"),
     "excitation.motion": ("Motion",),
     "excitation.problem": ("Problem",),
     "excitation.result": ("Result",),
@@ -157,7 +155,7 @@ _HOMES = {
     "shown.note": ("Level", "Note"),
     "simulation.settings": ("SimulationSettings",),
     "simulation.simulate": ("Simulation",),
-    "trajectory.chain": ("Segment",),
+    "trajectory.fade": ("Segment",),
     "workers.base": ("Workers",),
     "workers.catalogue": ("open_workers",),
 }

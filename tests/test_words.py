@@ -19,8 +19,8 @@ BANNED = re.compile(
 NAMES = {
     ("cli/app.py", "sealed"),
     ("diagnosis/verdict.py", "rests on what was weighed"),
-    ("workers/at_hand.py", "workers at hand"),
-    ("workers/child.py", "told"),
+    ("workers/context.py", "workers at hand"),
+    ("workers/worker_main.py", "told"),
     ("workers/processes.py", "told"),
 }
 

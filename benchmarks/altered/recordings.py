@@ -16,7 +16,7 @@ from excite_cli.effects.catalogue import declared_effects, kind_named
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.robot.model import build_robot
-from excite_cli.simulation.planted import plant
+from excite_cli.simulation.ground_truth import plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 

@@ -23,8 +23,8 @@ from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue, declared_effects, kind_named
 from excite_cli.robot.model import Array
 from excite_cli.simulation.build import true_inertias
+from excite_cli.simulation.ground_truth import sized
 from excite_cli.simulation.planned_motion import PlannedMotion
-from excite_cli.simulation.planted import sized
 from excite_cli.simulation.settings import SimulationSettings
 
 Group = Literal["one", "clean", "outside", "two", "absorbed", "hard", "history"]

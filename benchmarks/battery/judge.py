@@ -24,7 +24,7 @@ from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.limits import Limits
 from excite_cli.measurement.quality import checked, raise_for_errors
 from excite_cli.robot.model import Robot
-from excite_cli.simulation.planted import Planted
+from excite_cli.simulation.ground_truth import Planted
 from excite_cli.simulation.simulate import simulate
 
 
@@ -208,7 +208,7 @@ def answer_of(found: Diagnosis, dataset: Dataset) -> Answer:
             for each in found.effects
         ),
         tuple(Name(each.kind, each.joints) for each in found.absorbed),
-        found.joints_left,
+        found.joints_with_residual,
         tuple(j for f in dataset.findings if f.kind == "saturated" for j in f.joints),
     )
 

@@ -14,8 +14,8 @@ from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
+from excite_cli.simulation.ground_truth import Planted
 from excite_cli.simulation.planned_motion import Planned
-from excite_cli.simulation.planted import Planted
 
 RATIOS = (0.03, 0.30)
 NEAR_NOISE = (1.5, 3.0)  # times the noise's RMS

@@ -32,8 +32,8 @@ from excite_cli.config.spec import Spec
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.simulation.build import true_inertias
+from excite_cli.simulation.ground_truth import Planted, sized
 from excite_cli.simulation.planned_motion import Planned
-from excite_cli.simulation.planted import Planted, sized
 from excite_cli.simulation.settings import SimulationSettings
 
 _CLEAN_DECK = ("clean_white", "clean_colored", "clean_centers")

@@ -22,8 +22,8 @@ from excite_cli.effects.parameter import Parameter
 from excite_cli.effects.sign import smooth_sign
 from excite_cli.robot.model import Array
 from excite_cli.simulation.covariate_series import CovariateSeries
+from excite_cli.simulation.ground_truth import Planted
 from excite_cli.simulation.planned_motion import Planned
-from excite_cli.simulation.planted import Planted
 
 MINUTES = 40.0
 FOLLOWED = "temperature"

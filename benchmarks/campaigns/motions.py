@@ -12,7 +12,7 @@ from benchmarks.campaigns.robots import joint_limits
 from excite_cli.dynamics.regressor import Regressor
 from excite_cli.robot.model import Array
 from excite_cli.simulation.planned_motion import Planned, PlannedMotion, PlannedProgram
-from excite_cli.trajectory.chain import Chain, Segment
+from excite_cli.trajectory.fade import Chain, Segment
 from excite_cli.trajectory.fourier import FourierTrajectory
 from excite_cli.trajectory.point_to_point import PointToPoint, at_rest_between
 

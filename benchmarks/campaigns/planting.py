@@ -18,7 +18,7 @@ from benchmarks.campaigns.robots import leaves
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.robot.model import Array
-from excite_cli.simulation.planted import Planted
+from excite_cli.simulation.ground_truth import Planted
 
 _SHOWS = 1.0  # RMS of what is left of an effect, in units of the noise's
 _SEPARATE = 0.05  # share that the declared model and the other effects leave

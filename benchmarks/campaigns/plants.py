@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from excite_cli.simulation.planted import Planted
+from excite_cli.simulation.ground_truth import Planted
 
 # Effects whose columns are the first order of what they stand for.
 FIRST_ORDER = ("base_tilt", "encoder_offset", "elasticity", "backlash", "torque_delay")

@@ -19,8 +19,8 @@ from excite_cli.api.motions import load_motions
 from excite_cli.dynamics.base_parameters import base_parameters_as_given
 from excite_cli.effects.catalogue import catalogue, declared_effects, kind_named
 from excite_cli.robot.model import Robot
+from excite_cli.simulation.ground_truth import Planted, allowed_names, parse_planted
 from excite_cli.simulation.planned_motion import PlannedMotion
-from excite_cli.simulation.planted import Planted, allowed_names, parse_planted
 from excite_cli.simulation.settings import SimulationSettings
 
 _SHOWS = 1e-3  # share of its energy that the declared model must leave, as in the battery

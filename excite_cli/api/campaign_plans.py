@@ -7,8 +7,7 @@ from pathlib import Path
 from excite_cli.api.identifying import identify
 from excite_cli.api.loading import Case, load_case, measured_case, problem_of
 from excite_cli.api.planning import Planned, PlanProgress, plan, plan_after
-from excite_cli.campaign.records import Campaign, PlayedMotion, Purpose, Round
-from excite_cli.campaign.schedule import looked_for, pace_of
+from excite_cli.campaign.records import Campaign, PlayedMotion, Purpose, Round, looked_for, pace_of
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.candidates import effect_of

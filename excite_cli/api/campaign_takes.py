@@ -17,7 +17,7 @@ from excite_cli.errors import ExciteError, FileError, NoAdmissibleMotionError
 from excite_cli.measurement.motion_files import read_own_motion
 from excite_cli.shown.note import Level, Note, Tell
 from excite_cli.store.result_file import read_result
-from excite_cli.summary.doubts import doubts_in_words
+from excite_cli.summary.pairs import doubts_in_words
 
 
 @dataclass(frozen=True)

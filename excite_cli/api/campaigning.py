@@ -24,7 +24,7 @@ from excite_cli.campaign.ending import ended, still_open
 from excite_cli.campaign.inbox import Inbox as Inbox
 from excite_cli.campaign.measure import Measure as Measure
 from excite_cli.campaign.measure import Take
-from excite_cli.campaign.records import STATE, Learned, Round, read_campaign, write_campaign
+from excite_cli.campaign.records import STATE, Round, RoundFindings, read_campaign, write_campaign
 from excite_cli.campaign.records import Asked as Asked
 from excite_cli.campaign.records import Campaign as Campaign
 from excite_cli.claim import claim, leave
@@ -190,7 +190,7 @@ class _Loop:
         page = rounds_page(state, self.case.robot.name)
         write_text_atomically(self.folder / PAGE, render(page))
 
-    def _learned(self, state: Campaign, last: Round) -> Learned:
+    def _learned(self, state: Campaign, last: Round) -> RoundFindings:
         path = self.folder / diagnosis_of(last.number)
         logs = [self.folder / each.data for each in state.motions]
         self._say(f"round {last.number}: diagnosis of {len(logs)} logs")
@@ -212,8 +212,8 @@ class _Loop:
         )
         count, model = len(found.joint_names), following.model
         known = invariants(model, following.prior)
-        learned = Learned(
-            found.begins.mean_relative_moving,
+        learned = RoundFindings(
+            found.baseline.mean_relative_moving,
             found.after.mean_relative_moving,
             tuple(what_and_where(each.effect, count) for each in found.effects),
             still_open(found, pairs),

@@ -10,12 +10,13 @@ from excite_cli.config.load import parse_spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.admissible import path_of
 from excite_cli.excitation.inspection import (
+    Difference,
+    Inspections,
     Look,
     inspect,
     largest_mismatch,
     mesh_check_of,
 )
-from excite_cli.excitation.inspections import Difference, Inspections
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.time_scaling import PaceLimits, slowing
@@ -24,7 +25,7 @@ from excite_cli.robot.model import Array
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.result_file import is_result, read_result, read_samples
 from excite_cli.summary.inspections import check_answer as check_answer
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 
 _JUDGED = ("robot", "constraints", "uncertainty")  # sections that verdicts speak of
 

@@ -16,8 +16,8 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import random_baseline
 from excite_cli.excitation.result import Result, matches
 from excite_cli.store.result_file import read_result, write_result
-from excite_cli.summary.comparison import comparison_answer as comparison_answer
-from excite_cli.summary.doubts import doubts_in_words
+from excite_cli.summary.motions import comparison_answer as comparison_answer
+from excite_cli.summary.pairs import doubts_in_words
 from excite_cli.workers.base import Workers
 
 

@@ -29,8 +29,8 @@ from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.diagnosis_file import write_diagnosis
 from excite_cli.store.own_file import versions
 from excite_cli.summary.diagnosis import diagnosis_answer as diagnosis_answer
-from excite_cli.workers.at_hand import at_hand
 from excite_cli.workers.base import Workers
+from excite_cli.workers.context import at_hand
 
 _HAVE_IT = (
     "The effects found do not lower the error on held-out data. To have it in a config all the "

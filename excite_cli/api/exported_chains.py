@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from excite_cli.api.entering import Start, entered, start_posture
+from excite_cli.api.approach import Start, entered, start_posture
 from excite_cli.api.motions import is_motion, motions_of
 from excite_cli.config.constraints_spec import ConstraintsSpec, JointLimitsSpec
 from excite_cli.config.load import parse_spec
@@ -21,10 +21,10 @@ from excite_cli.measurement.motion_files import read_own_motion
 from excite_cli.robot.model import build_robot
 from excite_cli.shown.answer import Command, as_word
 from excite_cli.shown.note import Level, Note, Tell
-from excite_cli.store.fit_knowledge import fit_knowledge
+from excite_cli.store.fit_file import fit_knowledge
 from excite_cli.store.result_file import read_result, read_samples
-from excite_cli.summary.doubts import doubts_in_words
-from excite_cli.trajectory.chain import Chain, Segment
+from excite_cli.summary.pairs import doubts_in_words
+from excite_cli.trajectory.fade import Chain, Segment
 from excite_cli.trajectory.sampled import through_samples
 
 

@@ -5,11 +5,12 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from excite_cli.api.approach import Start, durations_of
 from excite_cli.api.arguments import checked
-from excite_cli.api.entering import Start, durations_of
 from excite_cli.api.exported_chains import ExportedChain, Wanted, chains_of
 from excite_cli.api.models import for_simulators, write_exported, write_model, write_models
-from excite_cli.api.outputs import existing, held, paths_in
+from excite_cli.api.outputs import held
+from excite_cli.api.paths import existing, paths_in
 from excite_cli.claim import claim, leave
 from excite_cli.config.load import files_of_config
 from excite_cli.errors import ConfigError, FileError, nearest

@@ -16,7 +16,7 @@ from excite_cli.api.loading import (
 )
 from excite_cli.api.models import write_models
 from excite_cli.api.outputs import held
-from excite_cli.checks.look import check_dataset
+from excite_cli.checks.all_checks import check_dataset
 from excite_cli.config.load import spec_as_yaml
 from excite_cli.excitation.problem import Problem
 from excite_cli.given_files import refuse_inputs_as_outputs
@@ -30,8 +30,8 @@ from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.fit_file import read_fit, write_fit
 from excite_cli.summary.identification import identification_answer as identification_answer
 from excite_cli.summary.load import load_answer as load_answer
-from excite_cli.workers.at_hand import at_hand
 from excite_cli.workers.base import Workers
+from excite_cli.workers.context import at_hand
 
 
 @checked()

@@ -14,10 +14,11 @@ from excite_cli.api.loading import (
     inputs_of,
     measured_case,
 )
-from excite_cli.api.outputs import held, page_path
+from excite_cli.api.outputs import held
+from excite_cli.api.paths import page_path
 from excite_cli.atomic import write_atomically, write_text_atomically
 from excite_cli.checks import rows
-from excite_cli.checks.look import look
+from excite_cli.checks.all_checks import look
 from excite_cli.checks.result import Result
 from excite_cli.checks.sentences import BELONG, written
 from excite_cli.checks.trust import but_trusted, check_names
@@ -29,7 +30,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.dataset import Dataset, joined, merged
-from excite_cli.report.inspection_page import inspection_page
+from excite_cli.report.assembly import inspection_page
 from excite_cli.report.page import render
 from excite_cli.robot.model import build_robot
 from excite_cli.shown.note import Tell, log_note

@@ -9,29 +9,83 @@ from typing import Any
 import numpy as np
 
 from excite_cli.api.arguments import checked
-from excite_cli.api.outputs import paths_in, refuse_twice
+from excite_cli.api.paths import paths_in, refuse_twice
 from excite_cli.base_link.rows import with_base
 from excite_cli.checks.bodies import bodies_in_words
-from excite_cli.config.load import files_of_config, load_spec, spec_of
+from excite_cli.config.load import files_of_config, load_spec, parse_spec, spec_of
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.errors import FileError
+from excite_cli.excitation.admissible import worst_margins
 from excite_cli.excitation.problem import Problem, build_problem
+from excite_cli.excitation.result import Result, matches
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.covariates import with_declared
 from excite_cli.measurement.dataset import Dataset, Finding, merged
 from excite_cli.measurement.motors import motors_of
 from excite_cli.measurement.quality import raise_for_errors
-from excite_cli.robot.glance import describe
+from excite_cli.robot.description import is_named
 from excite_cli.robot.model import Robot, build_measured_robot, build_robot
+from excite_cli.robot.overview import describe
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.shown.record import Shown, show
-from excite_cli.store.fit_file import read_fit
-from excite_cli.store.fit_knowledge import fit_knowledge
+from excite_cli.store.fit_file import fit_knowledge, read_fit
 from excite_cli.summary.inspection import runs_in_words
 from excite_cli.summary.problem import problem_notes
 from excite_cli.summary.robots import robot_parts
+
+# The problem of a result, from the config that the result holds.
+
+
+def with_own_margins(result: Result, problem: Problem) -> Result:
+    """The result, with margins taken anew of motions that its own may not be of."""
+    doubted = {motion.index: motion for motion in result.doubted()}
+    motions = (
+        replace(doubted[m.index], margins=worst_margins(problem, m.coefficients))
+        if m.index in doubted
+        else m
+        for m in result.motions
+    )
+    return replace(result, motions=tuple(motions))
+
+
+def rebuilt_problem(
+    result: Result, config: str | Path | None = None, name: str = "the result"
+) -> Problem:
+    """The problem that `result` was made for; `config` says where relative paths start.
+
+    Messages call the result `name`.
+
+    Raises
+    ------
+    FileError
+        The file holds no motion, its URDF is not found, or the robot is not the one it had.
+    """
+    if not result.motions:
+        raise FileError(f"{name} holds no motion yet. Go on with `excite optimize --resume`.")
+    spec = parse_spec(result.config, f"the config stored in {name}")
+    folder = Path(result.config_folder)
+    if config is not None:
+        folder, given = Path(config).resolve().parent, load_spec(Path(config)).robot
+        found = {name: getattr(given, name) for name in ("urdf", "package_dirs", "xacro_args")}
+        spec = spec.model_copy(update={"robot": spec.robot.model_copy(update=found)})
+    urdf = spec.robot.urdf
+    if not is_named(urdf) and not (folder / urdf).is_file():
+        raise FileError(
+            f"{name} was made with the URDF {urdf}, and there is none at "
+            f"{(folder / urdf).resolve()}. Relative paths start from the config: give the YAML "
+            "file it was made with, --config CONFIG.yaml."
+        )
+    problem = build_problem(spec, folder, fit_knowledge(spec, folder))
+    reason = matches(problem, result)
+    if reason:
+        raise FileError(
+            f"{name} does not fit the robot that was found ({urdf}): {reason}. Give the YAML file "
+            "it was made with, --config CONFIG.yaml, and the URDF as it was."
+        )
+    return problem
+
 
 # Share of a joint's torque on held-out data from which a fit is doubted.
 _MUCH_LEFT = 0.1

@@ -24,9 +24,9 @@ from excite_cli.store.diagnosis_file import is_diagnosis
 from excite_cli.store.fit_file import is_fit
 from excite_cli.store.result_file import is_result, read_result
 from excite_cli.summary import motions as motions  # how they are shown
-from excite_cli.summary.doubts import doubts_in_words
+from excite_cli.summary.pairs import doubts_in_words
 from excite_cli.trajectory.catalogue import build_trajectory
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 from excite_cli.trajectory.sampled import through_samples
 
 Motions = Result | Segment | Sequence[Segment] | Dataset | str | Path

@@ -27,14 +27,14 @@ from excite_cli.excitation.stack import Stack
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis
-from excite_cli.store.fit_knowledge import fit_knowledge
+from excite_cli.store.fit_file import fit_knowledge
 from excite_cli.store.own_file import versions
 from excite_cli.store.result_file import is_result, read_result, write_result
-from excite_cli.summary.doubts import doubts_in_words
 from excite_cli.summary.motions import motion_sentence
 from excite_cli.summary.motions import plan_answer as plan_answer
+from excite_cli.summary.pairs import doubts_in_words
 from excite_cli.summary.problem import problem_notes
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 from excite_cli.workers.base import Workers
 
 # Earlier data that a plan goes on from: results, measured data, motions.

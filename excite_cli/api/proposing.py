@@ -8,20 +8,64 @@ from typing import Literal, cast
 from excite_cli.api.arguments import checked
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_text_atomically
-from excite_cli.errors import ConfigError
+from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.errors import ConfigError, RobotError, nearest
 from excite_cli.proposal.joints import choose_joints, limbs
 from excite_cli.proposal.propose import Proposal, Request
 from excite_cli.proposal.propose import propose as propose_config
 from excite_cli.robot.allowed_files import Needed as Needed
-from excite_cli.robot.description import EXAMPLE_PREFIX as EXAMPLE_PREFIX
-from excite_cli.robot.description import example_robots as example_robots
-from excite_cli.robot.description import is_named as is_named
+from excite_cli.robot.description import EXAMPLE_PREFIX, example_robots, is_named
+from excite_cli.robot.model import build_robot
+from excite_cli.robot.overview import DescribedRobot, describe, known_robots
 from excite_cli.robot.package_search import Allow as Allow
 from excite_cli.robot.package_search import allow_nothing, load_with_folders
 from excite_cli.robot.urdf_joints import survey
 from excite_cli.shown.answer import Answer
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.summary.problem import proposal_answer
+from excite_cli.summary.robots import robot_answer as robot_answer
+from excite_cli.summary.robots import robots_answer
+
+# The robots at hand, and the joints of one: `excite robots`.
+
+
+def list_robots() -> Answer:
+    """The robots of example-robot-data, each with what its URDF lacks.
+
+    Raises
+    ------
+    RobotError
+        The package is not installed.
+    """
+    return robots_answer(known_robots(), list(example_robots()))
+
+
+@checked()
+def describe_robot(robot: str | Path) -> DescribedRobot:
+    """Joints of a robot with their limits and links; `robot` is a name of the list, or a URDF file.
+
+    Raises
+    ------
+    RobotError
+        It is neither, or the URDF is wrong.
+    """
+    return describe(build_robot(RobotSpec(urdf=_urdf(str(robot))), Path.cwd()))
+
+
+def _urdf(robot: str) -> str:
+    """What robot.urdf would be: a file's path, or the prefix and a name."""
+    if is_named(robot) or Path(robot).is_file():
+        return robot
+    if Path(robot).is_dir():
+        raise RobotError(f"{robot} is a folder. Give a URDF file, or a name: `excite robots`.")
+    known = example_robots()
+    if robot not in known:
+        raise RobotError(
+            f"there is neither a robot nor a file '{robot}'.{nearest(robot, known)} `excite "
+            f"robots` lists all names."
+        )
+    return f"{EXAMPLE_PREFIX}{robot}"
+
 
 Base = Literal["fixed", "floating"]
 _FARTHEST = 3  # folders upwards, for which a path is still told as a relative one

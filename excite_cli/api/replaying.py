@@ -10,7 +10,7 @@ from excite_cli.api.loading import Case, dataset_of
 from excite_cli.api.model import Model, load_model
 from excite_cli.api.models import for_simulators
 from excite_cli.api.scoring import recordings_of
-from excite_cli.checks.look import look, without_fault
+from excite_cli.checks.all_checks import look, without_fault
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import urdf_friction
 from excite_cli.errors import RobotError

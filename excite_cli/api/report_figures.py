@@ -7,7 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from excite_cli.api.outputs import held, refuse_twice
+from excite_cli.api.outputs import held
+from excite_cli.api.paths import refuse_twice
 from excite_cli.atomic import write_atomically
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.errors import FileError

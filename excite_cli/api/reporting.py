@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
-from excite_cli.api.outputs import held, page_path, paths_in
-from excite_cli.api.rebuilt import rebuilt_problem, with_own_margins
+from excite_cli.api.loading import rebuilt_problem, with_own_margins
+from excite_cli.api.outputs import held
+from excite_cli.api.paths import page_path, paths_in
 from excite_cli.api.report_figures import Told, read_files, write_figures
 from excite_cli.atomic import write_text_atomically
 from excite_cli.errors import ConfigError, FileError
@@ -16,7 +17,7 @@ from excite_cli.report.assembly import Source, page_of
 from excite_cli.report.page import render
 from excite_cli.report.style import matplotlib_part
 from excite_cli.shown.answer import Answer
-from excite_cli.summary.doubts import doubts_in_words
+from excite_cli.summary.pairs import doubts_in_words
 
 FIGURE_FORMATS = ("png", "svg", "pdf")
 Progress = Callable[[str, int, int], None]

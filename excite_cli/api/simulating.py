@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
+from excite_cli.api.approach import Start, entered, start_posture
 from excite_cli.api.arguments import checked
-from excite_cli.api.entering import Start, entered, start_posture
 from excite_cli.api.loading import Case, inputs_of, measured_case, problem_of
 from excite_cli.api.motions import Motions, load_motions
 from excite_cli.api.outputs import held
@@ -20,15 +20,15 @@ from excite_cli.measurement.hdf5_writer import write_dataset
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.simulation.base_sensors import Instruments
 from excite_cli.simulation.covariate_series import parse_series as parse_series
+from excite_cli.simulation.ground_truth import parse_planted
 from excite_cli.simulation.mujoco_model import load_mujoco
 from excite_cli.simulation.planned_motion import Planned, PlannedMotion, PlannedProgram
-from excite_cli.simulation.planted import parse_planted
 from excite_cli.simulation.settings import SimulationSettings as SimulationSettings
 from excite_cli.simulation.simulate import Simulation, takes_of
 from excite_cli.simulation.simulate import simulate as simulate_motions
 from excite_cli.store.own_file import versions
 from excite_cli.summary.simulation import simulation_answer as simulation_answer
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 
 # What of the config's measurement section changes neither positions nor torques when it is read.
 _KEPT = {"filter", "topic", "rate", "covariates", "wrench", "base"}

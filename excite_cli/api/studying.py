@@ -139,7 +139,7 @@ def _diagnosed(found: Diagnosis) -> Figures:
         "after": found.after.mean_relative_moving,
         "effects": _listed([(e.effect.kind, e.effect.joints) for e in found.named]),
         "absorbed": _listed([(e.kind, e.joints) for e in found.absorbed]),
-        "unexplained": ", ".join(found.joints_left),
+        "unexplained": ", ".join(found.joints_with_residual),
     }
 
 

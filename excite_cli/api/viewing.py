@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
-from excite_cli.api.loading import load_problem
+from excite_cli.api.loading import load_problem, rebuilt_problem
 from excite_cli.api.motions import Motions, load_motions, motions_of, tell_doubts
-from excite_cli.api.outputs import existing, held, paths_in
-from excite_cli.api.rebuilt import rebuilt_problem
+from excite_cli.api.outputs import held
+from excite_cli.api.paths import existing, paths_in
 from excite_cli.atomic import write_atomically
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.excitation.problem import Problem
@@ -19,7 +19,7 @@ from excite_cli.shown.note import Level, Note, Tell, log_note, saying
 from excite_cli.store.diagnosis_file import is_diagnosis
 from excite_cli.store.fit_file import is_fit
 from excite_cli.store.result_file import is_result, read_result
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 from excite_cli.view.browser import Serving as Serving
 from excite_cli.view.browser import play_in_browser
 from excite_cli.view.pictures import View as View

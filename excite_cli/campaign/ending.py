@@ -3,8 +3,7 @@
 from dataclasses import replace
 from math import isfinite
 
-from excite_cli.campaign.records import Campaign
-from excite_cli.campaign.schedule import pace_of
+from excite_cli.campaign.records import Campaign, pace_of
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.diagnosis.words import place_in_words
@@ -39,7 +38,7 @@ def left_on_newest(found: Diagnosis) -> list[str]:
 def still_open(found: Diagnosis, pairs: tuple[str, ...]) -> tuple[str, ...]:
     """What still matters, in sentences; `pairs`: effects that a motion could tell apart."""
     said = [f"{pair}: not distinguished yet" for pair in pairs]
-    said += [f"{joint}: excess residual of the torque" for joint in found.joints_left]
+    said += [f"{joint}: excess residual of the torque" for joint in found.joints_with_residual]
     said += left_on_newest(found)
     said += [
         f"{each.effect.kind} on {place_in_words(each.effect, len(found.joint_names))}: the newest "

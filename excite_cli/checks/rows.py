@@ -13,7 +13,7 @@ from excite_cli.checks import (
 )
 from excite_cli.checks.own import own_checks
 from excite_cli.checks.result import Result, Status
-from excite_cli.checks.set_up import CHECKS
+from excite_cli.checks.set_up_search import CHECKS
 from excite_cli.checks.trust import but_trusted, is_trusted
 from excite_cli.config.spec import Spec
 from excite_cli.measurement.dataset import Finding

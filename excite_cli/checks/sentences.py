@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from excite_cli.checks.result import Result, Status
-from excite_cli.checks.set_up import Step
+from excite_cli.checks.set_up_search import Step
 from excite_cli.checks.setup import Setup
 from excite_cli.checks.textbook_fit import Explained
 from excite_cli.checks.trust import key_of

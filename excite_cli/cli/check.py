@@ -46,7 +46,7 @@ def check(
     from excite_cli.api.checking import check as check_motions
     from excite_cli.api.checking import check_answer
     from excite_cli.api.loading import load_problem
-    from excite_cli.api.outputs import existing
+    from excite_cli.api.paths import existing
     from excite_cli.api.working import single_threaded
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)

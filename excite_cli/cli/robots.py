@@ -33,7 +33,7 @@ def robots(
       excite robots ur10
       excite robots ur10 --json
     """
-    from excite_cli.api.robots import describe_robot, list_robots, robot_answer
+    from excite_cli.api.proposing import describe_robot, list_robots, robot_answer
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     terminal.show(list_robots() if robot is None else robot_answer(describe_robot(robot)))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from excite_cli.constraints.drawing import Nearest
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.geometry.obstacles import Obstacle
-from excite_cli.geometry.segments import nearest_points, normals
+from excite_cli.geometry.world_segments import nearest_points, normals
 from excite_cli.robot.capsule import Capsule
 
 Array = NDArray[np.float64]

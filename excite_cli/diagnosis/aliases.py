@@ -60,7 +60,7 @@ def absorbed_effects(
             continue
         main = evidence.blocks[i][0]
         own = float(evidence.total[main, main])
-        if own <= 0.0 or schur.told_by_weight(i):
+        if own <= 0.0 or schur.identified_by_prior_only(i):
             continue
         columns = evidence.blocks[i] - evidence.fixed
         rest = schur.block(columns, columns)

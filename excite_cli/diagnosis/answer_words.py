@@ -42,7 +42,7 @@ def shares(found: Diagnosis) -> dict[str, float]:
     parts: dict[str, float] = {}
     for each in found.effects:
         group = FRICTION if _rubs(each) else each.effect.kind
-        parts[group] = parts.get(group, 0.0) + each.takes_off
+        parts[group] = parts.get(group, 0.0) + each.error_reduction
     if found.inertia_parts:
         parts[INERTIAS] = mean_of_known(found.inertia_parts.values())
     fall = sum(parts.values())
@@ -68,7 +68,7 @@ def _missing(found: Diagnosis) -> str:
     if _in_vain(found):
         return (
             f"Adding {counted(len(found.effects), 'effect')} does not lower the error "
-            f"where joints move ({relative_in_words(found.begins.mean_relative_moving)} before)."
+            f"where joints move ({relative_in_words(found.baseline.mean_relative_moving)} before)."
         )
     of_all = shares(found)
     said = []
@@ -87,9 +87,9 @@ def _missing(found: Diagnosis) -> str:
     doubtful = (HeldOutVerdict.NOT_CONFIRMED, HeldOutVerdict.HARMFUL, HeldOutVerdict.WEIGHED)
     others = [each for each in found.named if not _rubs(each) and each.verdict not in doubtful]
     fall = found.fall if found.fall > 0.0 else inf
-    worth = [each for each in others if each.takes_off >= _WORTH_SAYING * fall]
-    for each in sorted(worth, key=lambda each: -each.takes_off)[:_MOST]:
-        share = f"{each.takes_off / fall:.0%} of the unmodelled torque"
+    worth = [each for each in others if each.error_reduction >= _WORTH_SAYING * fall]
+    for each in sorted(worth, key=lambda each: -each.error_reduction)[:_MOST]:
+        share = f"{each.error_reduction / fall:.0%} of the unmodelled torque"
         what = f"{title_of(each.effect.kind)} ({_first(each)}, {share})"
         said.append(f"On {_place(each, found)}: {what}.")
     if not said:
@@ -190,7 +190,8 @@ def _next(found: Diagnosis) -> str:
         return "Next: use the model with its effects (--apply NEW.yaml)."
     by_motion = [each for each in open_names if not _weighed(each)]
     first = max(
-        by_motion or open_names, key=lambda each: 0.0 if isnan(each.takes_off) else each.takes_off
+        by_motion or open_names,
+        key=lambda each: 0.0 if isnan(each.error_reduction) else each.error_reduction,
     )
     other = first.aliases[0]
     names = f"{title_of(first.effect.kind)} of {_place(first, found)} from {title_of(other.kind)}"

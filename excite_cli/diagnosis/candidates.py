@@ -22,8 +22,8 @@ from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.processing import DEFAULT_MOVING
 from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array, Robot
-from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
+from excite_cli.workers.context import each
 
 _TOGETHER = 16  # effects that are filtered at once: their columns take little memory
 

@@ -19,7 +19,7 @@ from excite_cli.diagnosis.held_out_errors import Played
 from excite_cli.diagnosis.held_out_verdict import worth_beside
 from excite_cli.diagnosis.modelled_run import places_of
 from excite_cli.diagnosis.records import FrictionLine, by_joint
-from excite_cli.diagnosis.tracing import Traced
+from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.effects.catalogue import straight_friction
 from excite_cli.effects.parameter import Value, deviation
 from excite_cli.identification.identified_model import Prediction
@@ -29,7 +29,7 @@ from excite_cli.robot.model import Array
 _ROUNDING = 1e-9  # of a line of friction that has no such part
 
 
-def data_sheet_lines(traced: Traced, final: FinalFit) -> tuple[FrictionLine, ...]:
+def data_sheet_lines(traced: SearchResult, final: FinalFit) -> tuple[FrictionLine, ...]:
     """The line of every joint that has friction, in the robot's order."""
     lines = (_line(joint, traced, final) for joint in range(traced.model.robot.n))
     return tuple(line for line in lines if line is not None)
@@ -38,7 +38,7 @@ def data_sheet_lines(traced: Traced, final: FinalFit) -> tuple[FrictionLine, ...
 def with_worth(
     lines: Sequence[FrictionLine],
     held: Played,
-    traced: Traced,
+    traced: SearchResult,
     with_all: Sequence[Prediction],
     taken_off: Mapping[int, Array],
 ) -> tuple[FrictionLine, ...]:
@@ -66,7 +66,7 @@ def with_worth(
     return tuple(found)
 
 
-def _line(joint: int, traced: Traced, final: FinalFit) -> FrictionLine | None:
+def _line(joint: int, traced: SearchResult, final: FinalFit) -> FrictionLine | None:
     robot, effects = traced.model.robot, (*traced.model.declared, *traced.effects)
     places = places_of(effects, len(final.parameters))
     rubbing = [

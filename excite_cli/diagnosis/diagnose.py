@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from excite_cli.checks.look import findings_of
+from excite_cli.checks.all_checks import findings_of
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.aliases import absorbed_effects, joint_aliases, other_name
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.comparison import Comparison
 from excite_cli.diagnosis.data_sheet_line import data_sheet_lines, with_worth
-from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.effect_trace import effect_traces
-from excite_cli.diagnosis.final_fit import final_fit, over_error, regression
+from excite_cli.diagnosis.excess_residual import large_rests
+from excite_cli.diagnosis.final_fit import final_fit, regression, signal_to_error
 from excite_cli.diagnosis.held_out_errors import (
     INERTIAS,
     HeldOutErrors,
@@ -28,9 +28,9 @@ from excite_cli.diagnosis.held_out_errors import (
     refitted,
 )
 from excite_cli.diagnosis.held_out_verdict import Worth, worth_on_held_out
-from excite_cli.diagnosis.large_rest import large_rests
+from excite_cli.diagnosis.misspecification import approximations
 from excite_cli.diagnosis.modelled_run import Model, ModelledRun
-from excite_cli.diagnosis.naming import information_of, named_effects
+from excite_cli.diagnosis.naming import information_of, named_effects, order_of, rounds_of
 from excite_cli.diagnosis.own_torque import at_its_own_torque
 from excite_cli.diagnosis.records import (
     CUT_SHORT,
@@ -43,17 +43,16 @@ from excite_cli.diagnosis.records import (
     Textbook,
     by_joint,
 )
-from excite_cli.diagnosis.rounds import order_of, rounds_of
+from excite_cli.diagnosis.search_loop import SearchResult, trace
 from excite_cli.diagnosis.single_runs import (
     assumptions,
-    differences_told,
+    differences_between_runs,
     on_held_out_ends,
     runs_of_their_own,
 )
 from excite_cli.diagnosis.sufficient import comparison_of, sufficient
 from excite_cli.diagnosis.textbook import textbook
 from excite_cli.diagnosis.traces import Traces
-from excite_cli.diagnosis.tracing import Traced, trace
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.diagnosis.words import assumption_in_words
 from excite_cli.dynamics.base_parameters import BaseParameters
@@ -79,7 +78,7 @@ from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.campaign_clock import recorded
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.robot.model import Robot
-from excite_cli.robot.skeleton import skeleton_of
+from excite_cli.robot.tree import skeleton_of
 
 Progress = Callable[[str, int], None]
 # Of 74 logs set up wrongly by little, effects of other names were confirmed in 18 without this.
@@ -173,7 +172,7 @@ def diagnose(
     missed = compared.missed if compared else None
     if is_open:
         missed = _never
-    worth = worth_on_held_out(held, traced, with_all, over_error(traced, final), missed)
+    worth = worth_on_held_out(held, traced, with_all, signal_to_error(traced, final), missed)
     links = spec.diagnosis.carrying_links
     named, rivals = named_effects(traced, final, doubts, worth, taken_off, links)
     lines = data_sheet_lines(traced, final)
@@ -201,7 +200,7 @@ def diagnose(
             *standing,
             *_filter_bias(model, models[1], spec, parts.training, processing),
             *cut_short,
-            *differences_told(traced),
+            *differences_between_runs(traced),
             *_noticed(assumed, floor, robot, parts.training),
         ),
         processing=_choices(processing, traced, parts, training),
@@ -240,7 +239,7 @@ def _records(fitted: IdentifiedModel, robot: Robot) -> tuple[EffectRecord, ...]:
     return tuple(record_of(each, robot.joint_names, values) for each, values in fitted.by_effect)
 
 
-def _textbook(book: Sequence[int], traced: Traced, played: Played) -> Textbook:
+def _textbook(book: Sequence[int], traced: SearchResult, played: Played) -> Textbook:
     """Its effects beside the declared ones, and its error on the held-out data."""
     fitted = refitted(traced, book)
     added = _records(fitted, played.robot)[len(traced.model.declared) :]
@@ -248,7 +247,7 @@ def _textbook(book: Sequence[int], traced: Traced, played: Played) -> Textbook:
 
 
 def _path(
-    traced: Traced, named: Sequence[int], errors: HeldOutErrors, worth: Mapping[int, Worth]
+    traced: SearchResult, named: Sequence[int], errors: HeldOutErrors, worth: Mapping[int, Worth]
 ) -> ErrorPath | None:
     """The error against the number of effects; `named` are candidates in the order of the effects.
 
@@ -279,7 +278,7 @@ def _traced(
     progress: Progress,
     over: Callable[[], bool],
     start: Sequence[Effect] = (),
-) -> tuple[Traced, list[ModelledRun]]:
+) -> tuple[SearchResult, list[ModelledRun]]:
     """What is found in the training parts, and these as the model sees them.
 
     The effects `start` were found in more of them.
@@ -293,8 +292,8 @@ def _traced(
 
 
 def _needed(
-    traced: Traced, bodies: Sequence[ModelledRun], spec: Spec
-) -> tuple[Traced, list[int] | None, Comparison | None]:
+    traced: SearchResult, bodies: Sequence[ModelledRun], spec: Spec
+) -> tuple[SearchResult, list[int] | None, Comparison | None]:
     """The answer of what was found, the textbook's candidates, and how models compare.
 
     Not where nothing is looked for, nor where something was weighed: then None.
@@ -350,7 +349,9 @@ def _filter_bias(
     return filter_findings(runs, processing, spec.measurement.filter, behind)
 
 
-def _joint_aliases(traced: Traced, doubts: Mapping[int, Approximation]) -> tuple[JointAlias, ...]:
+def _joint_aliases(
+    traced: SearchResult, doubts: Mapping[int, Approximation]
+) -> tuple[JointAlias, ...]:
     model = traced.model
     shown = [i for i in traced.chosen if i not in doubts]
     sides = [
@@ -381,7 +382,7 @@ def _model(robot: Robot, base: BaseParameters, spec: Spec) -> Model:
 
 
 def _choices(
-    processing: Processing, traced: Traced, parts: Split, training: Sequence[PreparedRun]
+    processing: Processing, traced: SearchResult, parts: Split, training: Sequence[PreparedRun]
 ) -> dict[str, Any]:
     """Every choice that was made, for the result."""
     valid = np.concatenate([run.valid for run in training])

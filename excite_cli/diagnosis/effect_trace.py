@@ -11,8 +11,8 @@ import numpy as np
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.modelled_run import places_of
+from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.diagnosis.traces import EffectTrace
-from excite_cli.diagnosis.tracing import Traced
 from excite_cli.effects.base import Effect
 from excite_cli.identification.torque_trace import single
 from excite_cli.robot.model import Array
@@ -22,7 +22,7 @@ _MOST_ROWS = 3
 _WORTH_A_LOOK = 0.05  # of what the effect explains, in units of the noise
 
 
-def effect_traces(traced: Traced, parameters: Array) -> tuple[EffectTrace, ...]:
+def effect_traces(traced: SearchResult, parameters: Array) -> tuple[EffectTrace, ...]:
     """The traces of all effects that were found, with fitted `parameters` of the whole model."""
     left = traced.data.residuals(traced.candidates, traced.chosen, parameters)
     places = places_of(traced.effects, len(parameters))
@@ -33,7 +33,7 @@ def effect_traces(traced: Traced, parameters: Array) -> tuple[EffectTrace, ...]:
 
 
 def _trace(
-    traced: Traced, candidate: Candidate, values: Array, left: Sequence[Array]
+    traced: SearchResult, candidate: Candidate, values: Array, left: Sequence[Array]
 ) -> EffectTrace:
     effect, names = candidate.effect, traced.model.robot.joint_names
     parts = [k for k, s in enumerate(traced.signals) if effect.active(s.run)]
@@ -78,7 +78,7 @@ def _trace(
 
 
 def _abscissae(
-    traced: Traced, effect: Effect, parts: Sequence[int], joints: Sequence[int]
+    traced: SearchResult, effect: Effect, parts: Sequence[int], joints: Sequence[int]
 ) -> tuple[str, str, float | None, list[Array]]:
     """Name, unit, period and values (M, rows) of each part; no values for the torque itself."""
     first, values = None, []
@@ -91,7 +91,9 @@ def _abscissae(
     return (first.name, first.unit, first.period, values) if first else ("", "", None, [])
 
 
-def _strongest_rows(traced: Traced, candidate: Candidate, torque: Mapping[int, Array]) -> list[int]:
+def _strongest_rows(
+    traced: SearchResult, candidate: Candidate, torque: Mapping[int, Array]
+) -> list[int]:
     """Its rows with most of its `torque` per part, in units of the noise, the strongest first."""
     joints = list(candidate.rows)
     energy = np.zeros(len(joints))

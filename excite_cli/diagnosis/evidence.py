@@ -246,10 +246,10 @@ class Evidence:
         cross = self.total[self.fixed : -1, -1] - solved.T @ self.total[at, self.torque]
         own = np.diag(self.total)[self.fixed : -1]
         left = own - np.einsum("kp,kp->p", shared, solved)
-        told = self._told_by_weight(chosen, left)
+        told = self._identified_by_prior_only(chosen, left)
         return Schur(self._candidates, (shared, solved), left, cross, told)
 
-    def _told_by_weight(self, chosen: Sequence[int], left: Array) -> NDArray[np.bool_]:
+    def _identified_by_prior_only(self, chosen: Sequence[int], left: Array) -> NDArray[np.bool_]:
         """Columns of candidates of which next to nothing is left without what was weighed.
 
         `left` is of each with it. Candidates have the same norms without it.

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.diagnosis.modelled_run import places_of, width_of
-from excite_cli.diagnosis.tracing import Traced
+from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.dynamics.nearest_inertias import half_of
 from excite_cli.identification.factors import Mask
 from excite_cli.identification.fit import usual_sizes
@@ -39,7 +39,7 @@ class FinalFit:
     seen: Mask
 
 
-def regression(traced: Traced) -> LinearFit:
+def regression(traced: SearchResult) -> LinearFit:
     """What was found beside the declared model, by the regression of `identify` (`wls`)."""
     known, effects = traced.model.known, (*traced.model.declared, *traced.effects)
     wide = np.pad(known[:, :-1], ((0, 0), (0, width_of(traced.effects))))
@@ -53,7 +53,7 @@ def regression(traced: Traced) -> LinearFit:
     )
 
 
-def final_fit(traced: Traced, linear: LinearFit) -> FinalFit:
+def final_fit(traced: SearchResult, linear: LinearFit) -> FinalFit:
     """What is told of a regression of what was found."""
     parameters = linear.x
     covariance = np.where(np.isfinite(linear.covariance), linear.covariance, 0.0)
@@ -72,7 +72,7 @@ def final_fit(traced: Traced, linear: LinearFit) -> FinalFit:
     return FinalFit(parameters, covariance, linear.seen)
 
 
-def _by_shape(traced: Traced, member: int) -> Array:
+def _by_shape(traced: SearchResult, member: int) -> Array:
     """Standard deviation (w,) of the sizes of a chosen effect that its uncertain shape brings.
 
     The sizes that it has in other shapes, weighted by exp(−Δχ²/2): so likely are these shapes, if
@@ -95,26 +95,26 @@ def _by_shape(traced: Traced, member: int) -> Array:
     return np.sqrt(weights @ np.square(np.array(sizes) - sizes[0]) / weights.sum())
 
 
-def _size(traced: Traced, some: Sequence[int], member: int) -> Array:
+def _size(traced: SearchResult, some: Sequence[int], member: int) -> Array:
     """Parameters of a member of a set of candidates, fitted with the others."""
     parameters = traced.judge.plain.solve(some)
     effects = [traced.candidates[i].effect for i in some]
     return np.asarray(parameters[places_of(effects, len(parameters))[member]])
 
 
-def over_error(traced: Traced, found: FinalFit) -> dict[int, float]:
+def signal_to_error(traced: SearchResult, found: FinalFit) -> dict[int, float]:
     """Size over two standard deviations of every effect; of plain friction, that of the line."""
     count = len(found.parameters)
     lines = friction_lines(traced, count)
     shown, spread = lines @ found.parameters, lines @ found.covariance @ lines.T
     places = places_of(traced.effects, count)
     return {
-        i: traced.candidates[i].effect.over_error(shown[own], spread[own, own])
+        i: traced.candidates[i].effect.signal_to_error(shown[own], spread[own, own])
         for i, own in zip(traced.chosen, places, strict=True)
     }
 
 
-def friction_lines(traced: Traced, count: int) -> Array:
+def friction_lines(traced: SearchResult, count: int) -> Array:
     """T (k, k): all `count` parameters as they are judged = T @ parameters as fitted."""
     places = dict(zip(traced.chosen, places_of(traced.effects, count), strict=True))
     of_all_runs = {
@@ -137,7 +137,7 @@ def friction_lines(traced: Traced, count: int) -> Array:
     return transform
 
 
-def _first_row(traced: Traced, i: int) -> Array:
+def _first_row(traced: SearchResult, i: int) -> Array:
     """Columns (M, w) of candidate i in its first row, where that is usable."""
     own = traced.candidates[i]
     masks = [run.usable[:, own.rows[0]] for run in traced.data.runs]

@@ -28,7 +28,7 @@ import numpy as np
 
 from excite_cli.diagnosis.modelled_run import places_of, width_of
 from excite_cli.diagnosis.records import ErrorPath, mean_of_known
-from excite_cli.diagnosis.tracing import Traced
+from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.catalogue import urdf_friction
@@ -39,8 +39,8 @@ from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.regression import effect_columns, seen_of, with_effects
 from excite_cli.identification.torque_trace import TorqueTrace, torque_trace
 from excite_cli.robot.model import Array, Robot
-from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
+from excite_cli.workers.context import each
 
 # The declared model and that with the effects that were found, on runs: errors and traces.
 
@@ -83,18 +83,18 @@ def _predicted(shared: tuple[Robot, IdentifiedModel], run: PreparedRun, tell: Te
     return fitted.predicted(robot, run)
 
 
-def both_models(traced: Traced, parameters: Array) -> tuple[IdentifiedModel, IdentifiedModel]:
+def both_models(traced: SearchResult, parameters: Array) -> tuple[IdentifiedModel, IdentifiedModel]:
     """The declared model fitted to the training data, and the one with `parameters`."""
     found = _fitted(traced, traced.chosen, parameters)
     return refitted(traced, ()) if traced.chosen else found, found
 
 
-def refitted(traced: Traced, chosen: Sequence[int]) -> IdentifiedModel:
+def refitted(traced: SearchResult, chosen: Sequence[int]) -> IdentifiedModel:
     """The model with these of the candidates, fitted to the training data."""
     return _fitted(traced, chosen, traced.fitted(chosen))
 
 
-def _fitted(traced: Traced, chosen: Sequence[int], parameters: Array) -> IdentifiedModel:
+def _fitted(traced: SearchResult, chosen: Sequence[int], parameters: Array) -> IdentifiedModel:
     model = traced.model
     effects = (*model.declared, *(traced.candidates[i].effect for i in chosen))
     values = parameters[len(parameters) - width_of(effects) :]
@@ -111,7 +111,7 @@ _FEWEST_RUNS = 3  # of which a standard error says something
 
 def held_out_errors(
     played: Played,
-    traced: Traced,
+    traced: SearchResult,
     after: IdentifiedModel,
     first: Sequence[Prediction],
     last: Sequence[Prediction],
@@ -129,7 +129,7 @@ def held_out_errors(
 class _Fit:
     """Fits of models with any of those `who` join, to the training data."""
 
-    def __init__(self, traced: Traced, from_urdf: bool) -> None:
+    def __init__(self, traced: SearchResult, from_urdf: bool) -> None:
         model, chosen = traced.model, sorted(traced.chosen)
         found = [traced.candidates[i].effect for i in chosen]
         self.traced = traced
@@ -215,7 +215,7 @@ def _grams(
     ]
 
 
-def error_parts(traced: Traced, errors: HeldOutErrors) -> dict[int, Array]:
+def error_parts(traced: SearchResult, errors: HeldOutErrors) -> dict[int, Array]:
     """Per who joins, what it takes off the relative error of each joint (n,) where it moves.
 
     `errors` of the held-out data. NaN for joints that hardly move there.
@@ -231,7 +231,7 @@ def error_parts(traced: Traced, errors: HeldOutErrors) -> dict[int, Array]:
     return parts
 
 
-def _orders(traced: Traced, who: Sequence[int]) -> Iterator[list[int]]:
+def _orders(traced: SearchResult, who: Sequence[int]) -> Iterator[list[int]]:
     """Orders in which what is refined comes first."""
     rng = np.random.default_rng(_SEED)
     parents = {i: set(traced.judge.parents[i]) if i >= 0 else set() for i in who}
@@ -246,7 +246,9 @@ def _orders(traced: Traced, who: Sequence[int]) -> Iterator[list[int]]:
         yield order
 
 
-def error_path(traced: Traced, order: Sequence[int], held_out: HeldOutErrors) -> ErrorPath | None:
+def error_path(
+    traced: SearchResult, order: Sequence[int], held_out: HeldOutErrors
+) -> ErrorPath | None:
     """The error with none, one, two … of the candidates in `order`; None if there are none."""
     if not order:
         return None
@@ -266,7 +268,7 @@ def error_path(traced: Traced, order: Sequence[int], held_out: HeldOutErrors) ->
     )
 
 
-def _left_out(traced: Traced, steps: Sequence[tuple[int, ...]]) -> Array:
+def _left_out(traced: SearchResult, steps: Sequence[tuple[int, ...]]) -> Array:
     """Share (steps, runs) of the declared model's RMS that remains of blocks left out in turn.
 
     Mean over the joints of which a run says something; runs that say nothing are left away.

@@ -18,8 +18,8 @@ import numpy as np
 from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.held_out_errors import Played, refitted
 from excite_cli.diagnosis.records import Removed
+from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.diagnosis.textbook import everyday
-from excite_cli.diagnosis.tracing import Traced
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.identification.errors_of_torque import Errors, block_sums, drawn_blocks
 from excite_cli.identification.identified_model import Prediction
@@ -44,7 +44,7 @@ class Worth:
 
 def worth_on_held_out(
     held: Played,
-    traced: Traced,
+    traced: SearchResult,
     with_all: Sequence[Prediction],
     sizes: Mapping[int, float],
     missed: Missed | None = None,
@@ -62,7 +62,7 @@ def worth_on_held_out(
         joints = traced.candidates[i].effect.joints
         worth, rises = worth_beside(held, traced, with_all, rest, joints)
         verdict = worth.verdict
-        if traced.judge.told_by_weight(i, rest) and not rises:
+        if traced.judge.identified_by_prior_only(i, rest) and not rises:
             verdict = HeldOutVerdict.WEIGHED
         elif verdict is HeldOutVerdict.CONFIRMED:
             named = (
@@ -78,7 +78,7 @@ def worth_on_held_out(
 
 def worth_beside(
     held: Played,
-    traced: Traced,
+    traced: SearchResult,
     with_all: Sequence[Prediction],
     rest: Sequence[int],
     joints: Sequence[int],

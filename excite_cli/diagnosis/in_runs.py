@@ -25,8 +25,8 @@ from excite_cli.effects.catalogue import shows
 from excite_cli.effects.place import Place
 from excite_cli.identification.declared_states import States, declared_sets
 from excite_cli.robot.model import Array, Robot
-from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
+from excite_cli.workers.context import each
 
 _CHANGES = 3  # sets of runs in which one joint's friction, offset or gain may have changed
 _LOOKED_AT = 1000  # samples of a part, at most, from which the runs of an effect are told

@@ -120,14 +120,14 @@ class Judgement:
         key = (max(dof, 1), c.tests)
         if key not in self._thresholds:
             self._thresholds[key] = float(chi2.isf(self.rules.significance / c.tests, key[0]))
-        surprise = c.effect.surprise + rules.ON_FEWER_ROWS * (candidate in self._on_fewer_rows)
-        return self.rules.inflation * self._thresholds[key] + surprise
+        prior_cost = c.effect.prior_cost + rules.ON_FEWER_ROWS * (candidate in self._on_fewer_rows)
+        return self.rules.inflation * self._thresholds[key] + prior_cost
 
     @cached_property
     def _on_fewer_rows(self) -> set[int]:
         """Of candidates that scales alone tell from the declared model, those not on most rows."""
         schur = self.white.schur(())
-        told = [i for i in range(len(self.candidates)) if schur.told_by_weight(i)]
+        told = [i for i in range(len(self.candidates)) if schur.identified_by_prior_only(i)]
         most = max((len(self.candidates[i].rows) for i in told), default=0)
         return {i for i in told if len(self.candidates[i].rows) < most}
 
@@ -191,7 +191,7 @@ class Judgement:
         single = chi2.sf(gain.chi2 / self.rules.inflation, gain.dof)
         return float(min(1.0, self.candidates[candidate].tests * single))
 
-    def told_p_value(self, candidate: int, gain: Gain) -> float:
+    def reported_p_value(self, candidate: int, gain: Gain) -> float:
         """As `p_value`, but no smaller than the placebos back."""
         return max(self.p_value(candidate, gain), self.rules.least_p)
 
@@ -243,10 +243,10 @@ class Judgement:
         others = [j for j in range(len(self.plain.grams.joints)) if j not in own]
         return all(self.size(chosen, added, joints) < rules.SMALLEST for joints in (own, others))
 
-    def told_by_weight(self, candidate: int, others: Sequence[int]) -> bool:
+    def identified_by_prior_only(self, candidate: int, others: Sequence[int]) -> bool:
         """Whether it is a gain that scales alone tell from the model with the others."""
         gain = self.candidates[candidate].effect.of_whole_torque
-        return gain and self.white.schur(others).told_by_weight(candidate)
+        return gain and self.white.schur(others).identified_by_prior_only(candidate)
 
     def _weighs_little(self, candidate: int, others: Sequence[int]) -> bool:
         """Whether all of its torque is too small to matter: what it explains, inertias explain."""
@@ -269,7 +269,7 @@ class Judgement:
         together = [*chosen, *added]
         if not self.allowed(self.plain.solve(together), together, added):
             return Verdict.IMPOSSIBLE_SIGN
-        if len(added) == 1 and self.told_by_weight(added[0], chosen):
+        if len(added) == 1 and self.identified_by_prior_only(added[0], chosen):
             little = self._weighs_little(added[0], chosen)
             return Verdict.TOO_SMALL if little else Verdict.ACCEPTED
         if self.too_small(chosen, added):
@@ -323,7 +323,7 @@ class Judgement:
             return False
         if self.p_value(i, self.white.gain_of(i, chosen)) > self.rules.significance:
             return True
-        if self.told_by_weight(i, rest):
+        if self.identified_by_prior_only(i, rest):
             return self._weighs_little(i, rest)
         return gain < self.rules.gain or not large
 

@@ -22,8 +22,8 @@ from excite_cli.identification.regression import (
 )
 from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array, Robot
-from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
+from excite_cli.workers.context import each
 
 # What a diagnosis knows before: robot, declared effects, a prior or none, what was weighed.
 

@@ -11,28 +11,123 @@ from scipy.linalg import cholesky
 
 from excite_cli.diagnosis.aliases import aliases_of
 from excite_cli.diagnosis.candidates import record_of
-from excite_cli.diagnosis.doubt import explained
 from excite_cli.diagnosis.final_fit import FinalFit
 from excite_cli.diagnosis.held_out_verdict import Worth
+from excite_cli.diagnosis.misspecification import explained
 from excite_cli.diagnosis.modelled_run import places_of
 from excite_cli.diagnosis.records import (
     Approximation,
     EffectRecord,
     Information,
     NamedEffect,
+    Round,
+    Suspect,
     by_joint,
 )
 from excite_cli.diagnosis.schur import SHARED
-from excite_cli.diagnosis.tracing import Traced
+from excite_cli.diagnosis.search_loop import SearchResult
+from excite_cli.diagnosis.verdict import Verdict
+from excite_cli.diagnosis.words import joints_in_words
 from excite_cli.effects.place import Place
 from excite_cli.effects.placing import told_on
 from excite_cli.robot.model import Array
+
+# The way from the declared model to the diagnosis, one effect at a time.
+
+_SUSPECTS = 5
+
+
+def rounds_of(traced: SearchResult) -> tuple[Round, ...]:
+    """Rounds in the order of what each effect saves; the last one finds nothing more."""
+    names, order = traced.model.robot.joint_names, order_of(traced)
+    found: list[Round] = []
+    for count, best in enumerate([*order, None]):
+        residual = by_joint(names, _residual(traced, order[:count]))
+        suspects = _suspects(traced, order[:count], best)
+        verdict = "nothing more" if best is None else _words(traced, best)
+        found.append(Round(count + 1, residual, suspects, verdict))
+    return tuple(found)
+
+
+def order_of(traced: SearchResult) -> list[int]:
+    """The chosen candidates, first what saves most, then what saves most beside it, and so on."""
+    order: list[int] = []
+    judge, left = traced.judge, set(traced.chosen)
+    while left:
+        singles = judge.white.schur(order).singles
+        order.append(max(left, key=lambda i: singles[i].chi2 - judge.price(i, 1)))
+        left.remove(order[-1])
+    return order
+
+
+def _words(traced: SearchResult, i: int) -> str:
+    effect, joint_names = traced.candidates[i].effect, traced.model.robot.joint_names
+    where = joints_in_words([joint_names[j] for j in effect.joints], len(joint_names))
+    return f"{effect.kind} on {where}" + (f", by {effect.covariate}" if effect.covariate else "")
+
+
+def _residual(traced: SearchResult, chosen: Sequence[int]) -> Array:
+    """RMS (n,) [N·m] of what the model with the chosen effects leaves of the training torque."""
+    x = traced.judge.plain.solve(chosen)
+    left = traced.data.residuals(traced.candidates, chosen, x)
+    usable = np.concatenate([run.usable for run in traced.data.runs])
+    squares = np.where(usable, np.concatenate(left) ** 2, 0.0).sum(axis=0)
+    return np.asarray(np.sqrt(squares / np.maximum(usable.sum(axis=0), 1)))
+
+
+def _suspects(traced: SearchResult, chosen: list[int], accepted: int | None) -> tuple[Suspect, ...]:
+    """The strongest candidates of a round, one per kind and place, the accepted one first."""
+    judge, joint_names = traced.judge, traced.model.robot.joint_names
+    schur = judge.white.schur(chosen)
+    taken = {traced.candidates[i].place for i in chosen}
+    ranked = sorted(
+        (i for i, c in enumerate(traced.candidates) if c.place not in taken),
+        key=lambda i: judge.price(i, schur.singles[i].dof) - schur.singles[i].chi2,
+    )
+    order = ([accepted] if accepted is not None else []) + [i for i in ranked if i != accepted]
+    found: list[Suspect] = []
+    places: set = set()
+    for i in order:
+        candidate = traced.candidates[i]
+        if candidate.place in places:
+            continue
+        places.add(candidate.place)
+        p, joints = judge.p_value(i, schur.singles[i]), list(candidate.rows)
+        before = judge.plain.energy_on(chosen, joints)
+        share = 1.0 - judge.plain.energy_on([*chosen, i], joints) / max(before, 1e-300)
+        if i == accepted:
+            verdict = Verdict.ACCEPTED
+        elif p > judge.rules.significance:
+            verdict = Verdict.NOT_SIGNIFICANT
+        else:
+            verdict = judge.verdict(chosen, [i])
+            if verdict is Verdict.ACCEPTED:
+                verdict = Verdict.LATER if i in traced.chosen else Verdict.EXPLAINED
+        why = ""
+        if verdict is Verdict.IMPOSSIBLE_SIGN:
+            together = [*chosen, i]
+            why = traced.sizes.why_not(judge.plain.solve(together), together, [i])
+        found.append(
+            Suspect(
+                record_of(candidate.effect, joint_names),
+                max(p, judge.rules.least_p),
+                share,
+                judge.left_out_gain(chosen, [i]),
+                verdict,
+                judge.rules.least_p,
+                why,
+            )
+        )
+        if len(found) == _SUSPECTS:
+            break
+    return tuple(found)
+
 
 Rival = tuple[int, EffectRecord]  # a candidate that may stand for an effect, with values
 
 
 def named_effects(
-    traced: Traced,
+    traced: SearchResult,
     final: FinalFit,
     doubts: Mapping[int, Approximation],
     worth: Mapping[int, Worth],
@@ -65,7 +160,7 @@ def named_effects(
             parameters=effect.report_on(
                 robot.sliding, seen @ values, seen @ final.covariance[own, own] @ seen.T
             ),
-            p_value=judge.told_p_value(i, gain),
+            p_value=judge.reported_p_value(i, gain),
             share_of_residual=float(np.clip(share, 0.0, 1.0)),
             gain=float(judge.left_out_gain(rest, [i])),
             aliases=tuple(record for _, record in aliases),
@@ -79,7 +174,7 @@ def named_effects(
     return {i: found[i] for i in order}, rivals
 
 
-def _aliases(traced: Traced, i: int, rest: Sequence[int]) -> list[Rival]:
+def _aliases(traced: SearchResult, i: int, rest: Sequence[int]) -> list[Rival]:
     """What may stand for chosen candidate i beside the rest, with the values that it has then."""
     judge, model = traced.judge, traced.model
 
@@ -97,7 +192,7 @@ def _aliases(traced: Traced, i: int, rest: Sequence[int]) -> list[Rival]:
     return rivals
 
 
-def information_of(traced: Traced, rivals: Sequence[Rival]) -> Information:
+def information_of(traced: SearchResult, rivals: Sequence[Rival]) -> Information:
     """Triangular factor of the training data's columns, whitened, for the next motion."""
     model, effects = traced.model, (*traced.model.declared, *traced.effects)
     unique: dict[Place, Rival] = {}

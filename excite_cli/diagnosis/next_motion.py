@@ -79,7 +79,7 @@ class NextMotion(Shown):
                 }
             )
         found["expected_kl"] = min(pair["expected_kl"] for pair in found["pairs"])
-        found["told_apart_from"] = SEPARATED
+        found["distinguished_from"] = SEPARATED
         return found
 
 

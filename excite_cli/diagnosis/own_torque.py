@@ -14,14 +14,14 @@ import numpy as np
 
 from excite_cli.diagnosis.candidates import with_columns
 from excite_cli.diagnosis.modelled_run import ModelledRun, signals_of_all, training_data
-from excite_cli.diagnosis.tracing import Traced, values_of
+from excite_cli.diagnosis.search_loop import SearchResult, values_of
 from excite_cli.robot.model import Array
 
 _ROUNDS = 8
 _SETTLED = 1.02  # times the energy of the fit: 1 % of the error
 
 
-def at_its_own_torque(traced: Traced, bodies: Sequence[ModelledRun]) -> Traced:
+def at_its_own_torque(traced: SearchResult, bodies: Sequence[ModelledRun]) -> SearchResult:
     """The same effects with columns at their own torque."""
     chosen = traced.chosen
     if not chosen:
@@ -41,7 +41,7 @@ def at_its_own_torque(traced: Traced, bodies: Sequence[ModelledRun]) -> Traced:
     return best
 
 
-def _energy(traced: Traced, theta: Array) -> float:
+def _energy(traced: SearchResult, theta: Array) -> float:
     """What is left of the training data, in units of each joint's noise."""
     left = traced.data.residuals(traced.candidates, traced.chosen, theta)
     runs = traced.data.runs
@@ -53,7 +53,9 @@ def _energy(traced: Traced, theta: Array) -> float:
     )
 
 
-def _with_columns(traced: Traced, bodies: Sequence[ModelledRun], theta: Array) -> Traced:
+def _with_columns(
+    traced: SearchResult, bodies: Sequence[ModelledRun], theta: Array
+) -> SearchResult:
     model, effects = traced.model, traced.effects
     phi, values = model.full_inertias(theta), values_of(model, traced.data, theta)
     signals = signals_of_all(bodies, phi, (*model.declared, *effects), values)

@@ -16,8 +16,8 @@ from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.training import Columns, Shown, TrainingData
 from excite_cli.robot.model import Array
-from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
+from excite_cli.workers.context import each
 
 _SHIFTS = 6
 _SEED = 20261121

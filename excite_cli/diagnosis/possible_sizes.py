@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.reach import Reach
+from excite_cli.diagnosis.extrapolation import Reach
 from excite_cli.effects.base import Effect
 from excite_cli.effects.seen import Seen
 from excite_cli.robot.model import Array

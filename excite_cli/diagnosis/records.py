@@ -16,7 +16,7 @@ from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.measurement.campaign_clock import Recorded
 from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.model import Array
-from excite_cli.robot.skeleton import Skeleton
+from excite_cli.robot.tree import Skeleton
 from excite_cli.shown.record import Shown
 
 
@@ -93,7 +93,7 @@ class NamedEffect(Shown):
     parts: dict[str, float] = field(default_factory=dict)
 
     @property
-    def takes_off(self) -> float:
+    def error_reduction(self) -> float:
         """Its part of the fall of the mean relative error on held-out data; NaN if not known."""
         return mean_of_known(self.parts.values())
 
@@ -333,14 +333,14 @@ class Diagnosis(Shown):
         return tuple(self.effects[i] for i in self.path.effects[: self.path.smallest])
 
     @property
-    def begins(self) -> Errors:
+    def baseline(self) -> Errors:
         """Errors where the way begins along which effects take their parts off."""
         return self.untouched if self.inertia_parts and self.untouched else self.before
 
     @property
     def fall(self) -> float:
         """By how much the mean relative error on the held-out data fell, where joints move."""
-        return self.begins.mean_relative_moving - self.after.mean_relative_moving
+        return self.baseline.mean_relative_moving - self.after.mean_relative_moving
 
     @property
     def good(self) -> bool:
@@ -389,7 +389,7 @@ class Diagnosis(Shown):
         return tuple(each for each in self.large_rests if each.depends_on)
 
     @property
-    def joints_left(self) -> tuple[str, ...]:
+    def joints_with_residual(self) -> tuple[str, ...]:
         """Joints of whose torque structure, or surely more than noise, is left."""
         left = {each.joint for each in self.large_rests if each.certain}
         return tuple(joint for joint in self.joint_names if joint in left)
@@ -398,7 +398,7 @@ class Diagnosis(Shown):
     def complete(self) -> bool:
         """Whether the declared model lacks nothing: no effect, and nothing is left but noise."""
         ended = any(each.kind == CUT_SHORT for each in self.findings)
-        return not (self.effects or self.joints_left or ended)
+        return not (self.effects or self.joints_with_residual or ended)
 
     @property
     def approximations(self) -> tuple[NamedEffect, ...]:

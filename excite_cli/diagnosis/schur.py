@@ -117,15 +117,15 @@ class Schur:
         products: tuple[Array, Array],
         diagonal: Array,
         cross: Array,
-        told_by_weight: NDArray[np.bool_],
+        identified_by_prior_only: NDArray[np.bool_],
     ) -> None:
         """`products` (k, p) are G_Sc and N⁻¹ G_Sc, `diagonal` and `cross` (p,) of Z and z.
 
-        `told_by_weight` (p,): columns that scales tell from the model, and data do not.
+        `identified_by_prior_only` (p,): columns that scales tell from the model, and data do not.
         """
         self._candidates, self.diagonal, self.cross = candidates, diagonal, cross
         self._shared, self._solved = products
-        self._told = told_by_weight
+        self._told = identified_by_prior_only
 
     def block(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
         """What is left (r, c) of some candidates' columns, counted from the first candidate's."""
@@ -145,7 +145,7 @@ class Schur:
         cross = self.cross + values @ more
         return Schur(self._candidates, products, diagonal, cross, self._told)
 
-    def told_by_weight(self, candidate: int) -> bool:
+    def identified_by_prior_only(self, candidate: int) -> bool:
         """Whether scales alone tell a candidate of one column from the model."""
         at = self._candidates.blocks[candidate] - self._candidates.fixed
         return len(at) == 1 and bool(self._told[at[0]])
@@ -155,7 +155,7 @@ class Schur:
 
         Directions of which less than `absorbed` is left do not count, but for what scales tell.
         """
-        if len(candidates) == 1 and self.told_by_weight(candidates[0]):
+        if len(candidates) == 1 and self.identified_by_prior_only(candidates[0]):
             absorbed = SHARED
         e = self._candidates
         at = np.concatenate([e.blocks[i] for i in candidates]) - e.fixed

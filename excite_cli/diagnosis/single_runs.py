@@ -1,7 +1,7 @@
 """Effects of single runs: what is assumed of the held-out run, and what they are worth elsewhere.
 
 Of two recordings neither says what is usual: by how much more friction, offset or gain there is in
-one of them is told, and the model has what suits both (`differences_told`).
+one of them is told, and the model has what suits both (`differences_between_runs`).
 
 Any other such effect is not in the held-out run unless the configuration says so. So the ends of
 the training runs that carry one are held out, too (`split.with_ends_held_out`), and the errors
@@ -14,7 +14,7 @@ from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.held_out_errors import Played
 from excite_cli.diagnosis.modelled_run import Model, places_of
 from excite_cli.diagnosis.records import Assumption, HeldOutEnds
-from excite_cli.diagnosis.tracing import Traced, differences
+from excite_cli.diagnosis.search_loop import SearchResult, differences
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.base import Effect
 from excite_cli.identification.identified_model import IdentifiedModel
@@ -32,7 +32,7 @@ def runs_of_their_own(effects: Sequence[Effect]) -> set[str]:
     return {run for effect in effects if not effect.shapes for run in effect.runs}
 
 
-def differences_told(traced: Traced) -> tuple[Finding, ...]:
+def differences_between_runs(traced: SearchResult) -> tuple[Finding, ...]:
     """One line on all by which two recordings differ beyond chance; no line if by nothing."""
     judge, model = traced.judge, traced.model
     open_ = list(differences(traced.candidates, traced.data, model))

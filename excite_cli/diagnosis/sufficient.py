@@ -6,7 +6,7 @@ friction and rotors of the textbook beside it, and the textbook's model the one 
 parameters is the answer, unless the other predicts better by 2 % of the error.
 
 What single runs carry describes these recordings, and no new one is the better predicted for it
-(pushes, and a payload of two runs in three, were left out of the answer so). It stays if seconds
+(pushes, and a load of two runs in three, were left out of the answer so). It stays if seconds
 left out of the same recordings miss it, and is then beside both models that are compared.
 """
 
@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.comparison import Comparison
-from excite_cli.diagnosis.reach import torque_seen
+from excite_cli.diagnosis.extrapolation import torque_seen
 from excite_cli.diagnosis.search import weakest_apart
+from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.diagnosis.textbook import everyday
-from excite_cli.diagnosis.tracing import Traced
 from excite_cli.robot.model import Array
 
 # What every robot has stays in the model, unless the model says the same without it.
@@ -41,7 +41,7 @@ _ITS_OWN = 1e-6  # of a column's energy: what the model leaves of less is roundi
 _DEVIATIONS = 2.0
 
 
-def with_everyday(traced: Traced, chosen: Sequence[int]) -> list[int]:
+def with_everyday(traced: SearchResult, chosen: Sequence[int]) -> list[int]:
     """The chosen ones with the friction and rotors of the textbook, those that do not matter away.
 
     None that the chosen ones have among their columns, or exclude.
@@ -60,7 +60,7 @@ def with_everyday(traced: Traced, chosen: Sequence[int]) -> list[int]:
     return those_that_matter(traced, found)
 
 
-def those_that_matter(traced: Traced, chosen: Sequence[int]) -> list[int]:
+def those_that_matter(traced: SearchResult, chosen: Sequence[int]) -> list[int]:
     """Without those of the textbook's that surely do not matter, or whose size cannot be."""
     judge, found = traced.judge, list(chosen)
     elsewhere = _Elsewhere(traced, found)
@@ -83,7 +83,7 @@ def those_that_matter(traced: Traced, chosen: Sequence[int]) -> list[int]:
 class _Elsewhere:
     """What the model says along the usual motion: mean squares (n, K, K)."""
 
-    def __init__(self, traced: Traced, members: Sequence[int]) -> None:
+    def __init__(self, traced: SearchResult, members: Sequence[int]) -> None:
         self._traced, white = traced, traced.judge.white
         effects = [traced.candidates[i].effect for i in members]
         columns = white.columns(members)
@@ -125,13 +125,13 @@ def _otherwise(gram: Array, across: Array, own: Array, size: Array) -> Array:
     return np.asarray(mean + _DEVIATIONS * spread)
 
 
-def comparison_of(traced: Traced) -> Comparison:
+def comparison_of(traced: SearchResult) -> Comparison:
     """Of models of what was found and of the textbook's effects."""
     members = {*traced.chosen, *everyday(traced.candidates)}
     return Comparison(traced.data, traced.candidates, members, traced.levels)
 
 
-def sufficient(traced: Traced, models: Comparison) -> list[int]:
+def sufficient(traced: SearchResult, models: Comparison) -> list[int]:
     """The candidates found, with what every robot has, or the textbook's."""
     several = _seen_on_several(traced, models)
     single = _of_single_runs(traced, models, several)
@@ -147,7 +147,7 @@ def sufficient(traced: Traced, models: Comparison) -> list[int]:
     return those_that_matter(traced, best)
 
 
-def _seen_on_several(traced: Traced, models: Comparison) -> list[int]:
+def _seen_on_several(traced: SearchResult, models: Comparison) -> list[int]:
     """What was found, but for what acts on several joints and is missed on one of them at most."""
     judge, found = traced.judge, list(traced.chosen)
     while True:
@@ -163,7 +163,7 @@ def _seen_on_several(traced: Traced, models: Comparison) -> list[int]:
         found = judge.without(min(doubtful, key=doubtful.__getitem__), found)
 
 
-def _of_single_runs(traced: Traced, models: Comparison, found: Sequence[int]) -> list[int]:
+def _of_single_runs(traced: SearchResult, models: Comparison, found: Sequence[int]) -> list[int]:
     """What single runs carry, of what was found: seconds left out of the same recordings miss it.
 
     Or it is too brief for them to know.
@@ -180,6 +180,6 @@ def _of_single_runs(traced: Traced, models: Comparison, found: Sequence[int]) ->
     ]
 
 
-def _width(traced: Traced, some: Sequence[int]) -> int:
+def _width(traced: SearchResult, some: Sequence[int]) -> int:
     """Number of parameters."""
     return sum(traced.candidates[i].width for i in some)

@@ -15,8 +15,8 @@ from excite_cli.identification.covariance import Rows
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.out_of_core import Spool, forget
 from excite_cli.robot.model import Array
-from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
+from excite_cli.workers.context import each
 
 # Blocks of a run whose samples are fitted and judged in turn; short runs have four at least.
 _BLOCK = 1.0  # s

@@ -119,13 +119,13 @@ def by_worth(
     """
     ranked = sorted(
         effects,
-        key=lambda each: (-each.takes_off if each.parts else 0.0, -each.share_of_residual),
+        key=lambda each: (-each.error_reduction if each.parts else 0.0, -each.share_of_residual),
     )
     least = SMALL_PART * max(found.fall, 0.0)
 
     def is_small(named: NamedEffect) -> bool:
         told = named.verdict in (HeldOutVerdict.HARMFUL, HeldOutVerdict.WEIGHED)
-        return not told and abs(named.takes_off) < least
+        return not told and abs(named.error_reduction) < least
 
     return [each for each in ranked if not is_small(each)], list(filter(is_small, ranked))
 
@@ -281,7 +281,9 @@ def settled_in_words(found: Diagnosis) -> list[str]:
     kinds = dict.fromkeys(each.kind for each in found.absorbed)
     known = [catalogue()[kind] for kind in kinds if kind in catalogue()]
     return [
-        f"{each.kind} is identifiable with {each.settled_by}." for each in known if each.settled_by
+        f"{each.kind} is identifiable with {each.identified_by}."
+        for each in known
+        if each.identified_by
     ]
 
 

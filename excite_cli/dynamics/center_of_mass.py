@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.dynamics.spatial_adjoint import cross
-from excite_cli.robot.carried import carried_bodies
+from excite_cli.robot.carried_bodies import carried_bodies
 from excite_cli.robot.model import Array, Robot
 
 

@@ -19,7 +19,7 @@ class Armature(Effect):
     signature: ClassVar = "the residual is a straight line through zero over the acceleration"
     function_of: ClassVar = ("acceleration",)
     parameters: ClassVar = (Parameter("inertia", "kg·m²", 0.01, 30.0, nonnegative=True),)
-    surprise: ClassVar = 1.0
+    prior_cost: ClassVar = 1.0
     usual: ClassVar = True
 
     def columns(self, signals: Signals) -> Array:

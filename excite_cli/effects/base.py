@@ -74,7 +74,7 @@ class Effect(ABC):
     function_of: ClassVar[tuple[Quantity, ...]] = ()
     defaults: ClassVar[Mapping[str, float]] = {}  # of `planted`, for what is not named
     per_run: ClassVar[bool] = False  # present in some runs only: looked for in each on its own
-    may_begin: ClassVar[bool] = False  # from one day on a robot may have it, or more of it
+    can_appear_later: ClassVar[bool] = False  # from one day on a robot may have it, or more of it
     # In all runs, but its size may change from run to run: in runs of its own it is that change.
     changes_between_runs: ClassVar[bool] = False
     of_campaign: ClassVar[bool] = False  # its columns look at the campaign's clock
@@ -85,7 +85,7 @@ class Effect(ABC):
     # Its columns are the whole torque of the model: other effects of its joints are in them.
     of_whole_torque: ClassVar[bool] = False
     # What tells its size where inertias take it up, as a person may declare it.
-    settled_by: ClassVar[str] = ""
+    identified_by: ClassVar[str] = ""
     # A body that one joint carries: part of the load of joints, and named by its link if one likes.
     carried: ClassVar[bool] = False
     on_base: ClassVar[bool] = False  # rows of a measured base may have it, which have no gears
@@ -96,7 +96,7 @@ class Effect(ABC):
 
     # How a diagnosis judges it. Surprise: χ² that it must save beyond what chance makes of all
     # tests, where two kinds explain the data about as well.
-    surprise: ClassVar[float] = 4.0
+    prior_cost: ClassVar[float] = 4.0
     tier: ClassVar[Tier] = Tier.MANY_ROBOTS
     refines: ClassVar[tuple[str, ...]] = ()  # kinds of one joint that must be in before it
     excludes: ClassVar[tuple[str, ...]] = ()  # other forms of its cause: a place has one of them
@@ -114,7 +114,7 @@ class Effect(ABC):
     usual: ClassVar[bool] = False
 
     # Share of what it explains that may be lost where fitted numbers are moved to possible ones.
-    forgiven: ClassVar[float] = 0.0
+    projection_tolerance: ClassVar[float] = 0.0
 
     # Linear parameters that are its size, by name; empty: all of them together.
     size: ClassVar[tuple[str, ...]] = ()
@@ -257,17 +257,17 @@ class Effect(ABC):
         """Why values that are not `possible` cannot be the error of the fit; empty if they can.
 
         They cannot where the χ² distance to the `nearest` ones is one that chance exceeds in 1 % of
-        all cases, if it is also more than the share `forgiven` of all that the effect explains; and
-        what is then left of the effect must be more than its error.
+        all cases, if it is also more than the share `projection_tolerance` of all that the effect
+        explains; and what is then left of the effect must be more than its error.
         """
         near = self.nearest(values, covariance)
         if not self.possible(near):
             return self.why_not(values)
         whiten = np.linalg.inv(half_of(covariance))
         far, whole = (float(np.square(whiten @ x).sum()) for x in (values - near, values))
-        if far > max(unlikely_distance(len(values)), self.forgiven * whole):
+        if far > max(unlikely_distance(len(values)), self.projection_tolerance * whole):
             return self.why_not(values)
-        return "" if self.over_error(near, covariance) > 1.0 else self.why_not(values)
+        return "" if self.signal_to_error(near, covariance) > 1.0 else self.why_not(values)
 
     @property
     def varied(self) -> str:
@@ -295,7 +295,7 @@ class Effect(ABC):
         reasons = [parameter.why_not(float(value)) for parameter, value in given]
         return next((reason for reason in reasons if reason), "no effect of its kind is so")
 
-    def over_error(self, values: Array, covariance: Array) -> float:
+    def signal_to_error(self, values: Array, covariance: Array) -> float:
         """Size over error: above 1 beyond two standard deviations, or as rare for several."""
         names = [parameter.name for parameter in self.parameters]
         at = [names.index(name) for name in self.size or names]

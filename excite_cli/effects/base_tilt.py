@@ -36,7 +36,7 @@ class BaseTilt(Effect):
         Parameter("pitch", "rad", 1e-3, 0.2, believed=(-0.2, 0.2), because=_SEEN),
     )
     usual: ClassVar = True
-    may_begin: ClassVar = True
+    can_appear_later: ClassVar = True
 
     def model_error(self, values: Array) -> Array:
         """What those moments make of the angles; measured on simulated arms."""

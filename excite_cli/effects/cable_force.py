@@ -27,7 +27,7 @@ class CableForce(Effect):
         Parameter("first_squared", "N·m/rad²", 0.1, 100.0),
         Parameter("second_squared", "N·m/rad²", 0.1, 100.0),
     )
-    surprise: ClassVar = 25.0  # three functions of two angles come near an offset or a spring
+    prior_cost: ClassVar = 25.0  # three functions of two angles come near an offset or a spring
     tier: ClassVar = Tier.LAST
 
     def columns(self, signals: Signals) -> Array:

@@ -48,7 +48,9 @@ class Contact(Effect):
     shapes: ClassVar = (Parameter("start", "s", 0.0, 1e4), Parameter("end", "s", 0.0, 1e4))
     defaults: ClassVar[Mapping[str, float]] = {"start": 1.0, "end": 2.0}
     per_run: ClassVar = True
-    surprise: ClassVar = 60.0  # three forces in a window of one's choice explain any event a little
+    prior_cost: ClassVar = (
+        60.0  # three forces in a window of one's choice explain any event a little
+    )
     tier: ClassVar = Tier.LAST
     picture: ClassVar = "window"
     excitable: ClassVar = False

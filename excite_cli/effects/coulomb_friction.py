@@ -20,7 +20,7 @@ class CoulombFriction(Effect):
     parameters: ClassVar = (
         Parameter("coulomb", "N·m", 0.05, 300.0, nonnegative=True, part_of_torque=True),
     )
-    surprise: ClassVar = 0.0  # every joint has it
+    prior_cost: ClassVar = 0.0  # every joint has it
     tier: ClassVar = Tier.EVERY_ROBOT
     usual: ClassVar = True
     changes_between_runs: ClassVar = True

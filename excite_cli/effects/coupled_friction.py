@@ -41,7 +41,7 @@ class CoupledFriction(Effect):
     )
     shapes: ClassVar = (Parameter("direction", "1", -1.0, 1.0),)
     defaults: ClassVar[Mapping[str, float]] = {"direction": 1.0}
-    surprise: ClassVar = 3.0
+    prior_cost: ClassVar = 3.0
     refines: ClassVar = ("viscous_friction", "coulomb_friction")
     usual: ClassVar = True
 

@@ -67,7 +67,7 @@ class DahlFriction(Effect):
     )
     shapes: ClassVar = (Parameter("distance", "rad", *_DISTANCES),)
     defaults: ClassVar = {"distance": 0.03}
-    surprise: ClassVar = 2.0
+    prior_cost: ClassVar = 2.0
     refines: ClassVar = ("coulomb_friction",)
 
     @classmethod

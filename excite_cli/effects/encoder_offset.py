@@ -30,7 +30,7 @@ class EncoderOffset(Effect):
         ),
     )  # fmt: skip
     usual: ClassVar = True
-    may_begin: ClassVar = True
+    can_appear_later: ClassVar = True
 
     def model_error(self, values: Array) -> Array:
         """What the second order makes of it, as a share the offset itself [rad] or less."""

@@ -31,7 +31,7 @@ class FrictionDrift(Effect):
         Parameter("coulomb_rate", "N·m/s", 1e-3, 1.0),
         Parameter("viscous_rate", "N·m/rad", 1e-3, 1.0),
     )
-    surprise: ClassVar = 15.0  # within the seconds of a run, friction hardly warms up
+    prior_cost: ClassVar = 15.0  # within the seconds of a run, friction hardly warms up
     tier: ClassVar = Tier.LAST
     refines: ClassVar = ("viscous_friction", "coulomb_friction")
     deviates_from: ClassVar = refines

@@ -23,7 +23,7 @@ class LoadDependentFriction(Effect):
     function_of: ClassVar = ("speed", "load")
     friction: ClassVar = True
     parameters: ClassVar = (Parameter("ratio", "N·m/N·m", 0.005, 0.3, nonnegative=True),)
-    surprise: ClassVar = 1.0
+    prior_cost: ClassVar = 1.0
     refines: ClassVar = ("coulomb_friction",)
     deviates_from: ClassVar = ("viscous_friction", "coulomb_friction")
     usual: ClassVar = True

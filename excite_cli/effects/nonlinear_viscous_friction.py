@@ -27,7 +27,7 @@ class NonlinearViscousFriction(Effect):
     )
     shapes: ClassVar = (Parameter("power", "1", 0.5, 3.0),)
     defaults: ClassVar = {"power": 2.0}
-    surprise: ClassVar = 2.0
+    prior_cost: ClassVar = 2.0
     refines: ClassVar = ("viscous_friction", "coulomb_friction")
     deviates_from: ClassVar = refines
     usual: ClassVar = True

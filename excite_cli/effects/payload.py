@@ -59,7 +59,9 @@ class Payload(Effect):
     carried: ClassVar = True
     usual: ClassVar = True
     size: ClassVar = ("mass",)
-    forgiven: ClassVar = 0.05  # it is seen by its weight; of its inertia, models know little
+    projection_tolerance: ClassVar = (
+        0.05  # it is seen by its weight; of its inertia, models know little
+    )
 
     @classmethod
     def places(cls, robot: Robot) -> list[tuple[int, ...]]:

@@ -36,7 +36,7 @@ class PositionFriction(Effect):
     )
     shapes: ClassVar = (Parameter("periods", "1/turn", 1.0, 2.0), Parameter("power", "1", 0.0, 1.0))
     defaults: ClassVar = {"periods": 1.0, "power": 0.0}
-    surprise: ClassVar = 15.0
+    prior_cost: ClassVar = 15.0
     refines: ClassVar = ("coulomb_friction", "viscous_friction")
     varies: ClassVar = refines
     holds_until_beaten: ClassVar = 0.05

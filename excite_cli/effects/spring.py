@@ -24,7 +24,7 @@ class Spring(Effect):
         Parameter("preload", "N·m", 0.1, 2000.0),
     )
     # With less, a constant is called a preloaded spring as soon as noise bends it.
-    surprise: ClassVar = 12.0
+    prior_cost: ClassVar = 12.0
     usual: ClassVar = True
     # Of a real one (KR300's, hydraulic) a curve takes more than 5 % off, of k q³ nearly all.
     holds_until_beaten: ClassVar = 0.5

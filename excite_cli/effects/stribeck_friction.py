@@ -27,7 +27,7 @@ class StribeckFriction(Effect):
     )
     shapes: ClassVar = (Parameter("stribeck_speed", "rad/s", _LEAST_SPEED, 1.0),)
     defaults: ClassVar = {"stribeck_speed": 0.1}
-    surprise: ClassVar = 2.0
+    prior_cost: ClassVar = 2.0
     refines: ClassVar = ("viscous_friction", "coulomb_friction")
     deviates_from: ClassVar = refines
 

@@ -32,7 +32,7 @@ class TorqueGain(Effect):
     data_defect: ClassVar = True
     on_base: ClassVar = True
     of_whole_torque: ClassVar = True
-    settled_by: ClassVar = "a known payload on a run (identification.known_payload)"
+    identified_by: ClassVar = "a known payload on a run (identification.known_payload)"
     usual: ClassVar = True
     changes_between_runs: ClassVar = True
 

@@ -20,7 +20,7 @@ class TorqueOffset(Effect):
     signature: ClassVar = "the residual is the same wherever the joint is and however it moves"
     parameters: ClassVar = (Parameter("offset", "N·m", 0.05, 50.0, part_of_torque=True),)
     data_defect: ClassVar = True
-    surprise: ClassVar = 1.0
+    prior_cost: ClassVar = 1.0
     usual: ClassVar = True
     changes_between_runs: ClassVar = True
 

@@ -17,7 +17,7 @@ class ViscousFriction(Effect):
     function_of: ClassVar = ("speed",)
     friction: ClassVar = True
     parameters: ClassVar = (Parameter("viscous", "N·m·s/rad", 0.1, 100.0, nonnegative=True),)
-    surprise: ClassVar = 0.0  # every joint has it
+    prior_cost: ClassVar = 0.0  # every joint has it
     tier: ClassVar = Tier.EVERY_ROBOT
     usual: ClassVar = True
     changes_between_runs: ClassVar = True

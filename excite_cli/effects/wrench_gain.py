@@ -17,11 +17,11 @@ class WrenchGain(TorqueGain):
     signature: ClassVar = "the residual has the shape of the wrench itself, in all of its rows"
     scope: ClassVar = "base"
     on_base: ClassVar = False
-    settled_by: ClassVar = (
+    identified_by: ClassVar = (
         "the known robot mass (identification.total_mass) or a known payload on a run "
         "(identification.known_payload)"
     )
-    may_begin: ClassVar = True
+    can_appear_later: ClassVar = True
     changes_between_runs: ClassVar = False
     excitable: ClassVar = False
     why_not_excitable: ClassVar = "planned motions have a base that stands still"

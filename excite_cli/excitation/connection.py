@@ -21,7 +21,7 @@ from excite_cli.excitation.path_search import find_way
 from excite_cli.excitation.problem import Problem
 from excite_cli.proof.certificate import certify
 from excite_cli.trajectory.base import Trajectory
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 from excite_cli.trajectory.point_to_point import PointToPoint
 
 Judge = Callable[[Trajectory, Array], str | None]

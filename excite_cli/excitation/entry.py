@@ -32,8 +32,7 @@ from excite_cli.excitation.connection import (
 from excite_cli.excitation.path_search import standing_margins
 from excite_cli.excitation.problem import Problem
 from excite_cli.trajectory.base import Trajectory
-from excite_cli.trajectory.chain import Chain, Segment
-from excite_cli.trajectory.fade import Fade
+from excite_cli.trajectory.fade import Chain, Fade, Segment
 from excite_cli.trajectory.fourier import FourierTrajectory
 
 _FADE_PERIODS = (1, 2, 3)

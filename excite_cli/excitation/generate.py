@@ -11,7 +11,6 @@ from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.admissible import verdicts, worst_margins
 from excite_cli.excitation.base_motion import base_motion
 from excite_cli.excitation.dense_grid import dense_condition_number
-from excite_cli.excitation.given_start import start_from
 from excite_cli.excitation.motion import Motion, Outcome
 from excite_cli.excitation.one_start import (
     FoundMotion,
@@ -25,9 +24,9 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Progress, ProgressCallback, Stage, Starts, Status
 from excite_cli.excitation.solvers.base import Solver
 from excite_cli.excitation.stack import Stack
-from excite_cli.excitation.start import Start, moved_note
+from excite_cli.excitation.start import Start, moved_note, start_from
 from excite_cli.excitation.task import MotionTask
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 from excite_cli.workers.base import Here, News, Watch, Workers
 
 # Beyond this condition number some parameters do not show at all.

@@ -6,8 +6,8 @@ share nothing with that computation but the description of the robot, and from t
 by Pinocchio and coal.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from excite_cli.constraints.joint_columns import Quantity
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.admissible import CONTROLLER_RATE
 from excite_cli.excitation.mesh_verdict import MeshVerdict, mesh_verdict
+from excite_cli.excitation.motion import Doubt
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.mesh_check import MeshCheck
 from excite_cli.proof.certificate import Path, Verdict, Worst, certify
@@ -258,3 +259,67 @@ def largest_mismatch(path: Path, times: Array, stored: Sequence[Array]) -> tuple
         if off.max() > worst:
             worst, when = float(off.max()), float(times[int(np.argmax(off))])
     return worst, when
+
+
+# What was seen of several motions, and how it was looked at.
+
+# Stored samples may differ from the motion by rounding only.
+_SAME = 1e-6
+
+
+@dataclass(frozen=True)
+class Difference:
+    """By how much samples that a file holds differ from its coefficients, and when [s].
+
+    `share`: of the largest value.
+    """
+
+    share: float = 0.0
+    time: float = 0.0
+
+    @property
+    def broken(self) -> bool:
+        """Whether it is more than rounding: someone changed one of them."""
+        return self.share > _SAME
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Inspections(Shown, Mapping[str, Inspection]):
+    """Inspections by the motion's name.
+
+    `differences`: of the samples of motions from a result file. `doubts`: why motions of a result
+    do not count as proved, whatever the result says of them. `slow`: the share of the limits of
+    speed and acceleration that the motions were slowed to, if they were.
+    """
+
+    motions: dict[str, Inspection]
+    look: Look
+    differences: dict[str, Difference] = field(default_factory=dict)
+    slow: float | None = None
+    doubts: dict[str, Doubt] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Inspection:
+        return self.motions[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.motions)
+
+    def __len__(self) -> int:
+        return len(self.motions)
+
+    def difference(self, name: str) -> Difference:
+        """That of one motion; none where no samples are known."""
+        return self.differences.get(name, Difference())
+
+    def doubt(self, name: str) -> Doubt:
+        """That of one motion; none where it is not of a result."""
+        return self.doubts.get(name, Doubt.NONE)
+
+    def violations_of(self, name: str) -> int:
+        """Those of one motion, samples that differ included."""
+        return self.motions[name].violations + self.difference(name).broken
+
+    @property
+    def violations(self) -> int:
+        """Those of all motions."""
+        return sum(map(self.violations_of, self.motions))

@@ -9,7 +9,7 @@ from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.robot.model import Array
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 
 
 def closest_time(problem: Problem, segment: Segment, rate: float = 100.0) -> float:

@@ -4,7 +4,7 @@ import numpy as np
 
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.stack import Stack
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 
 
 def planned_stack(problem: Problem, motion: Segment) -> tuple[Stack, str]:

@@ -17,7 +17,7 @@ from excite_cli.excitation.sequence import Step, generate_sequence
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack
 from excite_cli.geometry.reasons import dropped_in_words
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 from excite_cli.workers.base import Workers
 
 

@@ -9,7 +9,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import ProgressCallback
 from excite_cli.excitation.solvers.base import Solver
 from excite_cli.excitation.stack import Stack
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 from excite_cli.workers.base import Workers
 
 

@@ -20,7 +20,7 @@ from excite_cli.constraints.joint_columns import Quantity
 from excite_cli.errors import ConfigError
 from excite_cli.proof.enclosed_trajectory import Intervals, enclosed_states, intervals_of
 from excite_cli.trajectory.base import Trajectory
-from excite_cli.trajectory.chain import Chain
+from excite_cli.trajectory.fade import Chain
 
 # A share of the limits below which a motion takes hours, and no memory holds its instants.
 _LEAST = 1e-3

@@ -4,6 +4,7 @@ Every effect states its own C (`Effect.in_c`); the file is `model_template.c` wi
 """
 
 import re
+from collections.abc import Mapping
 from importlib.resources import files
 
 import numpy as np
@@ -12,12 +13,20 @@ from excite_cli.effects.base import Effect
 from excite_cli.effects.c_code import real, reals
 from excite_cli.effects.sign import WIDTH
 from excite_cli.export.exported import ModelText, in_words
-from excite_cli.export.gaps import filled
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.regression import Series
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.tree import Tree, tree_of
 from excite_cli.scoring.thresholds import REVERSAL, Residual, Thresholds
+
+# Filling the gaps of a template, `@NAME@`.
+
+
+def filled(text: str, gaps: Mapping[str, str]) -> str:
+    """The text with its gaps filled, in one pass: what is put in may look like a gap."""
+    places = "|".join(re.escape(name) for name in gaps)
+    return re.sub(f"@({places})@", lambda found: gaps[found[1]], text)
+
 
 # The collision detector of a model's C file: thresholds, their low pass, and a test of both.
 

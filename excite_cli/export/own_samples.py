@@ -13,7 +13,7 @@ from excite_cli.config.load import parse_spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.result import Result
 from excite_cli.robot.model import Array
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 
 _SAME = 1e-6  # of the largest value: they differ by rounding only
 

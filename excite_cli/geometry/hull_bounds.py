@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.geometry.link_meshes import LinkMesh, Poses
-from excite_cli.geometry.segments import nearest_points
+from excite_cli.geometry.world_segments import nearest_points
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from excite_cli.geometry.link_meshes import LinkMesh, Part, Poses
 from excite_cli.geometry.reasons import Standing
-from excite_cli.robot.carried import MovedBodies
+from excite_cli.robot.carried_bodies import MovedBodies
 from excite_cli.robot.model import Robot
 
 Array = NDArray[np.float64]

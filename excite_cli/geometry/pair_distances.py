@@ -14,11 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.dynamics.forward_kinematics import States
-from excite_cli.geometry.segments import Nearest, nearest_points, normals
-from excite_cli.geometry.world_segments import CapsuleAxes, WorldSegments
+from excite_cli.geometry.world_segments import (
+    CapsuleAxes,
+    Nearest,
+    WorldSegments,
+    nearest_points,
+    normals,
+)
 from excite_cli.kernels.compiled import KERNELS
 from excite_cli.robot.capsule import Capsule
-from excite_cli.robot.carried import carried_bodies
+from excite_cli.robot.carried_bodies import carried_bodies
 from excite_cli.robot.model import Robot
 
 Array = NDArray[np.float64]

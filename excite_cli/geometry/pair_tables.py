@@ -26,7 +26,7 @@ from excite_cli.geometry.mesh_pairs import PairMeshes, joined_links, movable_pai
 from excite_cli.geometry.pair_table import PairTable
 from excite_cli.geometry.reasons import NEVER
 from excite_cli.robot.capsule import Capsule
-from excite_cli.robot.carried import MovedBodies
+from excite_cli.robot.carried_bodies import MovedBodies
 from excite_cli.robot.model import Robot
 
 Array = NDArray[np.float64]

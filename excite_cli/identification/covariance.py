@@ -19,8 +19,8 @@ from scipy.sparse import csr_matrix
 from excite_cli.identification.factors import Mask, triangle_of
 from excite_cli.out_of_core import forget
 from excite_cli.robot.model import Array
-from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
+from excite_cli.workers.context import each
 
 # Serially correlated noise: an autoregressive model per joint, its order by AICc.
 #

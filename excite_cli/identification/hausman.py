@@ -22,8 +22,8 @@ from excite_cli.identification.noise_floor import exact_period
 from excite_cli.measurement.dataset import Dataset, Mask, Run
 from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array
-from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
+from excite_cli.workers.context import each
 
 Source = Literal["reference", "periods", "none"]
 REFERENCE = "q_ref"

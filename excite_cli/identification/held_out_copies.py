@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from excite_cli.errors import FileError
 from excite_cli.identification.split import Split
 from excite_cli.measurement.dataset import Run, row_hashes
-from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
+from excite_cli.workers.context import each
 
 Hashes = NDArray[np.uint64]
 _WINDOW = 32  # samples: beyond chance even for one joint with a coarse encoder

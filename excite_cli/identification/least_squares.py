@@ -25,8 +25,8 @@ from excite_cli.identification.factors import (
 )
 from excite_cli.out_of_core import Spool, forget
 from excite_cli.robot.model import Array
-from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
+from excite_cli.workers.context import each
 
 Method = Literal["ols", "wls", "irls"]
 _ROUNDS, _SETTLED = 30, 1e-6

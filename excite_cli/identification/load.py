@@ -23,11 +23,11 @@ from excite_cli.effects.catalogue import carried_body
 from excite_cli.effects.parameter import Value, deviation
 from excite_cli.effects.signals import Signals
 from excite_cli.errors import ConfigError, FileError
-from excite_cli.identification.body_numbers import about_centre, about_frame, slopes
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.filter_bias import filter_findings
 from excite_cli.identification.fit import Fit, fit
 from excite_cli.identification.identify import judged
+from excite_cli.identification.link_changes import about_centre, about_frame, slopes
 from excite_cli.identification.prepare import PreparedRun, require_motion
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.regression import (

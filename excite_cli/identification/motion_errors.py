@@ -19,8 +19,8 @@ import numpy as np
 from excite_cli.identification.processing import ABOVE_FLOOR, HIGHEST_BY_RATE, Processing, spectra
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 from excite_cli.measurement.resolution import lattice_step
-from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
+from excite_cli.workers.context import each
 
 # Relative errors of speed and acceleration that are told. What is lost is lost in the same way all
 # the time, and inertias and friction are off by as much; what counts add is noise, and makes

@@ -30,8 +30,8 @@ from excite_cli.identification.averages import (
 )
 from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
-from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
+from excite_cli.workers.context import each
 
 # The period of a repeated motion to a fraction of a sample, from positions with gaps.
 #

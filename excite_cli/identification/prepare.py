@@ -24,8 +24,8 @@ from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Array, Finding, Run
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.out_of_core import Spool
-from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
+from excite_cli.workers.context import each
 
 # Around a reversal a joint sticks: what its friction then is, only the torque itself knows.
 _STICKING = 0.02  # s

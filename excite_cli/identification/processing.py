@@ -14,8 +14,8 @@ import numpy as np
 from excite_cli.config.data_spec import FilterSpec
 from excite_cli.errors import ConfigError
 from excite_cli.measurement.dataset import Array, Run
-from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
+from excite_cli.workers.context import each
 
 # The signal has met its floor where the spectrum is below this multiple of it.
 ABOVE_FLOOR = 20.0

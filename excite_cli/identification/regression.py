@@ -18,8 +18,8 @@ from excite_cli.measurement.dataset import Run
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array, Robot
-from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
+from excite_cli.workers.context import each
 
 # Samples on which columns are tried: whether they change with the model's torque.
 _PROBE = 60

@@ -27,7 +27,7 @@ from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import carried_body, scales
 from excite_cli.errors import ConfigError
-from excite_cli.identification.body_numbers import SIX_AT, about_frame, slopes
+from excite_cli.identification.link_changes import SIX_AT, about_frame, slopes
 from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.link_frame import link_frame, own_link
 from excite_cli.robot.model import Array, Robot

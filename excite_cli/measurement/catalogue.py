@@ -27,8 +27,8 @@ from excite_cli.measurement.reader import SINCE_1970, RawRun, Reader, ReadOption
 from excite_cli.measurement.run_identity import Origin
 from excite_cli.measurement.torque import SECONDS, check_joints, check_motors, declared, to_joints
 from excite_cli.out_of_core import Spool
-from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
+from excite_cli.workers.context import each
 
 READERS: tuple[Reader, ...] = (
     Hdf5Reader(), CsvReader(), BagReader(), MatReader(), ParquetReader(),

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.geometry.segments import nearest_points, normals
+from excite_cli.geometry.world_segments import nearest_points, normals
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.taylor import Array, Taylor, dot
 from excite_cli.robot.capsule import Capsule

@@ -12,11 +12,18 @@ from excite_cli.config.load import apply_override, parse_spec, parsed_spec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.proposal.disabled_pairs import chosen_srdf, disabled_pairs
+from excite_cli.proposal.feasibility import (
+    Comments,
+    FirstPosture,
+    Settled,
+    Tree,
+    first_posture,
+    settle,
+)
 from excite_cli.proposal.joints import Choice, choose_joints
 from excite_cli.proposal.limits import MOST_ACCELERATION, JointPlan, plan_limits
-from excite_cli.proposal.pace import Pace, choose_pace
-from excite_cli.proposal.settle import Comments, FirstPosture, Settled, Tree, first_posture, settle
 from excite_cli.proposal.shapes import Shapes, choose_shapes
+from excite_cli.proposal.timing import Pace, choose_pace
 from excite_cli.robot.assumed_inertias import with_assumed_inertias
 from excite_cli.robot.description import RobotDescription
 from excite_cli.robot.model import build_robot

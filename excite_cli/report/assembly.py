@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from excite_cli.checks.sentences import written
 from excite_cli.diagnosis.answer_words import answer_in_words
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.excitation.problem import Problem
@@ -22,12 +23,35 @@ from excite_cli.report.diagnosis_sections import diagnosis_figures, diagnosis_se
 from excite_cli.report.fit_sections import fit_figures, fit_sections
 from excite_cli.report.margin_section import margin_figures, margin_section
 from excite_cli.report.motion_section import motion_section
-from excite_cli.report.page import KeyFigure, Page, Section, Text
-from excite_cli.report.score_sections import score_figures, score_sections
+from excite_cli.report.page import KeyFigure, Page, Section, Table, Text
+from excite_cli.report.score_sections import score_figures, score_sections, table_of
 from excite_cli.report.weakest_section import weakest_section
 from excite_cli.scoring.records import Score
-from excite_cli.summary.doubts import doubts_in_words
+from excite_cli.summary.inspection import Inspected, checks_table, counted, headline, remarks
+from excite_cli.summary.pairs import doubts_in_words
 from excite_cli.summary.score import sentences
+
+# The page of an inspection: what of log and model is fine, doubtful or wrong, and its cure.
+
+
+def inspection_page(found: Inspected, title: str) -> Page:
+    """The table of all checks, the evidence of what is not fine, and what would be set."""
+    faults, doubts, _ = counted(found)
+    sections = [Section("checks", "Checks", (table_of(checks_table(found)),))]
+    if texts := remarks(found):
+        sections.append(Section("evidence", "Evidence", tuple(map(Text, texts))))
+    if found.settings:
+        rows = tuple((key, written({key: value})) for key, value in found.settings.items())
+        cures = Table(("key", "line that inspect --apply writes"), rows, wordy=frozenset({1}))
+        sections.append(Section("settings", "What would change in the config", (cures,)))
+    return Page(
+        title,
+        "Log and model, before any physics",
+        (KeyFigure("faults", str(faults)), KeyFigure("doubts", str(doubts))),
+        tuple(sections),
+        (Text(headline(found), "good" if found.good else "bad"),),
+    )
+
 
 # All that a page says about one result file, in reading order.
 

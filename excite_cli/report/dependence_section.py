@@ -12,7 +12,7 @@ from excite_cli.diagnosis.words import covariate_in_words, rests_in_words
 from excite_cli.report.chart import Chart, Colour, limits_about
 from excite_cli.report.page import Block, Charts, Section, Text
 from excite_cli.report.plot import Panel, Plot, Series, merged
-from excite_cli.report.residual_unit import readable_unit
+from excite_cli.report.residual_section import readable_unit
 from excite_cli.robot.model import Array
 
 # Shares in a grid: the larger, the darker, with the figure in each cell, as SVG.

@@ -119,7 +119,7 @@ def _row(found: Diagnosis, named: NamedEffect) -> tuple[str, ...]:
         place_in_words(named.effect, everything),
         "; ".join(value_in_words(name, value) for name, value in named.parameters.items()),
         p_in_words(named.p_value, named.least_p),
-        _points(named.takes_off),
+        _points(named.error_reduction),
         f"{named.gain:.1%}",
         held_out_in_words(named) or "–",
         others or "–",

@@ -98,8 +98,8 @@ def diagnosis_figures(diagnosis: Diagnosis) -> tuple[KeyFigure, ...]:
         ),
         KeyFigure(
             "unexplained",
-            counted(len(diagnosis.joints_left), "joint"),
-            ", ".join(diagnosis.joints_left) or "the residual behaves like noise",
+            counted(len(diagnosis.joints_with_residual), "joint"),
+            ", ".join(diagnosis.joints_with_residual) or "the residual behaves like noise",
         ),
         _warnings(diagnosis),
     )

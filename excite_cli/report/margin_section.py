@@ -16,8 +16,7 @@ from excite_cli.report.motion_section import drawn_motions, not_drawn
 from excite_cli.report.page import Block, Charts, Choice, KeyFigure, Section, Table, Text
 from excite_cli.report.plot import Panel, Plot, Series
 from excite_cli.robot.model import Array
-from excite_cli.summary.doubts import doubts_in_words
-from excite_cli.summary.pairs import counted, unguarded_in_words, unjudged
+from excite_cli.summary.pairs import counted, doubts_in_words, unguarded_in_words, unjudged
 
 _POINTS = 400
 

@@ -17,7 +17,7 @@ from excite_cli.geometry.obstacles import Box
 from excite_cli.report.campaign import Campaign, in_figures
 from excite_cli.report.chart import Chart, side_view
 from excite_cli.robot.model import Array
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 
 _WIDTH, _HEIGHT, _MARGIN = 284.0, 210.0, 8.0  # pt
 _THIN = 0.012  # [m] radius of a line between joints, where there are no capsules

@@ -10,8 +10,26 @@ from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.report.chart import thinned
 from excite_cli.report.page import Block, Charts, Choice, Text
 from excite_cli.report.plot import Panel, Plot, Series
-from excite_cli.report.residual_unit import readable_unit, torque_or_force
 from excite_cli.robot.model import Array
+
+# Units in which small and large torques read well.
+
+
+def readable_unit(unit: str, largest: float) -> tuple[float, str]:
+    """Factor and unit for values up to `largest`: N·m becomes kN·m, mN·m or µN·m."""
+    if largest >= 1e3:
+        return 1e-3, f"k{unit}"
+    if largest < 1e-5:
+        return 1e6, f"µ{unit}"
+    if largest < 1e-2:
+        return 1e3, f"m{unit}"
+    return 1.0, unit
+
+
+def torque_or_force(unit: str) -> str:
+    """What is measured in `unit`."""
+    return "torque" if unit.endswith("N·m") else "force"
+
 
 # Points of all lines together, and of one line at most and at least: the page must stay light.
 _BUDGET, _MOST, _FEWEST = 240_000, 700, 150

@@ -8,7 +8,7 @@ import numpy as np
 
 from excite_cli.report.chart import Chart, side_view
 from excite_cli.robot.model import Array
-from excite_cli.robot.skeleton import Skeleton
+from excite_cli.robot.tree import Skeleton
 
 _WIDTH, _ROW, _MARGIN = 284.0, 13.0, 12.0  # pt
 _ROBOT = 0.52  # of the width; the rest is for names

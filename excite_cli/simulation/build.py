@@ -15,6 +15,7 @@ from excite_cli.errors import RobotError
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.covariate_series import CovariateSeries
+from excite_cli.simulation.ground_truth import Planted
 from excite_cli.simulation.mujoco_model import (
     Plant,
     build_plant,
@@ -22,7 +23,6 @@ from excite_cli.simulation.mujoco_model import (
     load_mujoco,
     refresh,
 )
-from excite_cli.simulation.planted import Planted
 
 # Inertias that differ from the URDF, as those of a real robot do, and stay those of some body.
 #

@@ -11,7 +11,7 @@ import numpy as np
 
 from excite_cli.robot.model import Array
 from excite_cli.trajectory.base import Trajectory
-from excite_cli.trajectory.chain import Chain
+from excite_cli.trajectory.fade import Chain
 from excite_cli.trajectory.fourier import FourierTrajectory
 
 

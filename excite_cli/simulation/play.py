@@ -12,8 +12,8 @@ from excite_cli.errors import RobotError
 from excite_cli.robot.model import Array
 from excite_cli.simulation.build import Build
 from excite_cli.simulation.controller import Gains, Reference
+from excite_cli.simulation.ground_truth import Planted
 from excite_cli.simulation.mujoco_model import Plant, load_mujoco
-from excite_cli.simulation.planted import Planted
 
 # Effects that MuJoCo has no part for: their own formula, evaluated at every control step.
 #

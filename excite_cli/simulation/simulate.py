@@ -23,9 +23,9 @@ from excite_cli.simulation.controller import (
     gains_of,
     reference_of,
 )
+from excite_cli.simulation.ground_truth import Planted, sized
 from excite_cli.simulation.mujoco_model import silent_engine
 from excite_cli.simulation.planned_motion import Planned
-from excite_cli.simulation.planted import Planted, sized
 from excite_cli.simulation.play import Played, play
 from excite_cli.simulation.record import record
 from excite_cli.simulation.settings import SimulationSettings

@@ -35,7 +35,7 @@ from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.measurement.campaign_clock import Recorded
 from excite_cli.measurement.dataset import Finding
 from excite_cli.measurement.hdf5_writer import new_hdf5
-from excite_cli.robot.skeleton import Skeleton
+from excite_cli.robot.tree import Skeleton
 from excite_cli.store import checked
 from excite_cli.store.own_file import PROGRAM, OwnFile, is_marked, opened
 from excite_cli.store.trace_groups import (

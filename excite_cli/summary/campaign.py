@@ -3,12 +3,12 @@
 from dataclasses import asdict
 from pathlib import Path
 
-from excite_cli.campaign.records import Campaign, Learned, Round
+from excite_cli.campaign.records import Campaign, Round, RoundFindings
 from excite_cli.shown.answer import Answer, Part, Table
 from excite_cli.shown.record import show
 
 
-def round_in_words(number: int, learned: Learned) -> str:
+def round_in_words(number: int, learned: RoundFindings) -> str:
     """`round 2: held-out error 1.32% → 0.19% of the torque on the newest motion; …`."""
     named = ", ".join(learned.effects) or "no effect"
     left = "; open: " + "; ".join(learned.open) if learned.open else "; nothing is open"

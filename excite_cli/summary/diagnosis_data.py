@@ -33,7 +33,7 @@ def _named(named: NamedEffect, runs: list[str]) -> dict[str, Any]:
         "runs": list(named.effect.runs) or runs,
         "verdict": named.verdict,
         "removes": {joint: asdict(each) for joint, each in named.removes.items()},
-        "takes_off": dict(named.parts),
+        "error_reduction": dict(named.parts),
     }
 
 
@@ -102,8 +102,8 @@ def diagnosis_data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, An
             "textbook": found.textbook.error.as_data() if found.textbook else None,
             "after": found.after.as_data(),
             "parts": [_ends(part) for part in found.parts],
-            "begins": "untouched" if found.inertia_parts else "before",
-            "inertias_take_off": dict(found.inertia_parts),
+            "baseline": "untouched" if found.inertia_parts else "before",
+            "inertias_error_reduction": dict(found.inertia_parts),
             "untouched": found.untouched.as_data() if found.untouched else None,
             "training": found.trained.as_data() if found.trained else None,
             "samples": found.after.samples,

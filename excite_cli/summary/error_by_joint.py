@@ -116,7 +116,7 @@ def _taken_off(found: Diagnosis, joint: str) -> str:
 
 def _parts(found: Diagnosis) -> Table:
     """Every joint's way from the first error to the last, by all that takes a part off."""
-    begin, unit = found.begins, dict(_joints(found))
+    begin, unit = found.baseline, dict(_joints(found))
     rows: list[tuple[str, ...]] = []
     parted: list[int] = []
     for joint in found.joint_names:

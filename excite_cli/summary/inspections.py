@@ -2,14 +2,12 @@
 
 from typing import Any
 
-from excite_cli.excitation.inspection import Inspection
-from excite_cli.excitation.inspections import Inspections
+from excite_cli.excitation.inspection import Inspection, Inspections
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.reasons import standing_in_words
 from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
-from excite_cli.summary.doubts import worst_data
-from excite_cli.summary.pairs import pairs_data, pairs_in_words
+from excite_cli.summary.pairs import pairs_data, pairs_in_words, worst_data
 
 _CAPTION = "A margin is what is left beyond what the config asks to keep."
 

@@ -122,7 +122,7 @@ def effect_table(shown: Sequence[NamedEffect], everything: int, verbose: bool) -
             place_in_words(named.effect, everything),
             "\n".join(value_in_words(name, value) for name, value in named.parameters.items()),
             *([p_in_words(named.p_value, named.least_p)] if verbose else []),
-            points(named.takes_off),
+            points(named.error_reduction),
             held_out_in_words(named),
         )
         for named in shown
@@ -187,7 +187,7 @@ def _approximation_table(shown: Sequence[NamedEffect], everything: int) -> Table
             each.effect.kind,
             place_in_words(each.effect, everything),
             "\n".join(value_in_words(name, value) for name, value in each.parameters.items()),
-            points(each.takes_off),
+            points(each.error_reduction),
             held_out_in_words(each),
             approximation_in_words(each.approximates) if each.approximates else "",
         )

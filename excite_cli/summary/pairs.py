@@ -1,12 +1,46 @@
 """Which pairs of bodies a verdict speaks of, and which it leaves out."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from excite_cli.constraints.obstacle_clearance import Surroundings
 from excite_cli.constraints.self_collision import SelfCollision
+from excite_cli.excitation.motion import Doubt, Motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.reasons import DroppedPair, Why, dropped_in_words, reason_in_words
+from excite_cli.proof.certificate import Worst
 from excite_cli.robot.model import links_by_joint
+
+# Motions that do not count as proved, in words.
+
+# Worst margins for scripts.
+
+
+def worst_data(worst: Worst) -> dict[str, Any]:
+    """A worst margin for `--json`."""
+    return {
+        "margin": worst.margin,
+        "share": worst.share,
+        "unit": worst.unit,
+        "where": worst.label,
+        "time": worst.time,
+        "violations": worst.violations,
+    }
+
+
+def doubts_in_words(motions: Sequence[Motion]) -> list[str]:
+    """For each reason that there is: `motion 1 is not proved: …`, without a full stop."""
+    found: dict[Doubt, list[str]] = {}
+    for motion in motions:
+        if motion.doubt:
+            found.setdefault(motion.doubt, []).append(str(motion.index))
+    return [
+        f"motion {which[0]} is not proved: {why}"
+        if len(which) == 1
+        else f"motions {', '.join(which)} are not proved: each {why}"
+        for why, which in found.items()
+    ]
+
 
 # Reasons that leave a pair to chance; the others say that nothing can happen.
 UNJUDGED = (Why.UNGUARDED, Why.ALWAYS_TOUCHING, Why.ALWAYS_NEAR, Why.IGNORED)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from excite_cli.robot.description import EXAMPLE_PREFIX
-from excite_cli.robot.glance import DescribedJoint, DescribedRobot, Glance
+from excite_cli.robot.overview import DescribedJoint, DescribedRobot, Glance
 from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
 

@@ -20,7 +20,7 @@ import numpy as np
 from excite_cli.errors import ConfigError, MissingExtraError
 from excite_cli.excitation.problem import Problem
 from excite_cli.robot.model import Robot
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 from excite_cli.view.camera import fitted_camera
 from excite_cli.view.guarded_server import guarded
 from excite_cli.view.instants import Instants, instants_of

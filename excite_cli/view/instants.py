@@ -12,7 +12,7 @@ from excite_cli.excitation.nearest import nearest_bodies
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.robot.model import Array
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 
 
 @dataclass(frozen=True, eq=False)

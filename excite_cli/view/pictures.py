@@ -12,7 +12,7 @@ from excite_cli.excitation.nearest import closest_time
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.robot.model import Array
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 from excite_cli.view.camera import Camera, fitted_camera
 from excite_cli.view.geometry import Colour
 from excite_cli.view.ground import PAPER

@@ -31,7 +31,7 @@ from excite_cli.workers.base import (
     able_to_travel,
     unwatched,
 )
-from excite_cli.workers.child import keep_memory
+from excite_cli.workers.worker_main import keep_memory
 
 # What must be the same on every machine that takes part, and what better is.
 #

@@ -33,7 +33,7 @@ from excite_cli.workers.base import (
 # keeps the current folder out: a json.py that lies there is no part of us.
 _BOOT = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[3]); "
-    "from excite_cli.workers.child import serve; "
+    "from excite_cli.workers.worker_main import serve; "
     "serve(int(sys.argv[1]), int(sys.argv[2]), json.loads(sys.argv[4]))"
 )
 _OURS, _NOT_NEEDED = "excite_cli.", "excite_cli.cli."

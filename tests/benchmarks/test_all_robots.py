@@ -15,7 +15,7 @@ from benchmarks.robots.sources import Source, sources
 from excite_cli.api.loading import load_case
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.effects.payload import Payload
-from excite_cli.simulation.planted import Planted
+from excite_cli.simulation.ground_truth import Planted
 
 SMOKE = Path(__file__).parents[2] / "configs" / "smoke.yaml"
 PLANT = {

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from excite_cli.campaign.ending import ended, left_on_newest, still_open
-from excite_cli.campaign.records import Asked, Campaign, Learned, PlayedMotion, Round
+from excite_cli.campaign.records import Asked, Campaign, PlayedMotion, Round, RoundFindings
 from excite_cli.diagnosis.records import Diagnosis, Removed
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.identification.errors_of_torque import Errors
@@ -83,7 +83,7 @@ def campaign(
                 PlayedMotion(f"r{number}_m{k}", "excite", "p.h5", k, 1.0, 10.0, "log")
                 for k in (1, 2)
             ),
-            Learned(0.1, 0.01, ("spring on elbow",), open_, pairs, known),
+            RoundFindings(0.1, 0.01, ("spring on elbow",), open_, pairs, known),
         )
         for number, (open_, pairs) in enumerate(rounds, start=1)
     )

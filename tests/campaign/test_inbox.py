@@ -16,16 +16,44 @@ from excite_cli.campaign.inbox import Inbox
 from excite_cli.campaign.measure import Take
 from excite_cli.claim import claim, leave
 from excite_cli.errors import FileError
-from tests.campaign.campaign_process import PATIENCE, until
+from tests.campaign.campaign_process import until
 
-STILL = 0.3  # s
+STILL = inbox._STILL  # s
+
+
+class Clock:
+    """The clock of the campaign that waits: it goes on when the test says so, and never alone."""
+
+    def __init__(self) -> None:
+        self._now, self._looks = 0.0, 0
+
+    def monotonic(self) -> float:
+        return self._now
+
+    def sleep(self, seconds: float) -> None:
+        """Between two looks of the campaign."""
+        self._looks += 1
+        time.sleep(0.002)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(time, name)
+
+    def forward(self, seconds: float) -> None:
+        """So much later; the campaign has looked before and after that."""
+        for step in (seconds, 0.0):
+            looks = self._looks
+            until(lambda looks=looks: self._looks > looks + 1, "the campaign looks")
+            self._now += step
+
+    def tick(self) -> None:
+        self._now += STILL
 
 
 class Desk:
     """A campaign that waits for one log, in a thread of its own, and the person who brings it."""
 
     def __init__(self, folder: Path) -> None:
-        self.box, self.said = folder / "inbox", []
+        self.box, self.said, self.clock = folder / "inbox", [], Clock()
         self.motion, self.log = self.box / "m.csv", self.box / "m_log.csv"
         source = folder / "motion.csv"
         source.write_text("t\n0\n")
@@ -41,23 +69,23 @@ class Desk:
 
     def taken(self) -> str:
         """What was taken."""
-        assert self._waiting is not None
-        self._waiting.join(PATIENCE)
-        assert not self._waiting.is_alive()
+        waiting = self._waiting
+        assert waiting is not None
+        until(lambda: self.clock.tick() or not waiting.is_alive(), "a log is taken")
         return self.take.data.read_text()
 
     def says(self, *words: str) -> str:
         """What it says of a file that it does not take."""
-        until(lambda: len(self.said) > 1, f"it says {words}")
+        until(lambda: self.clock.tick() or len(self.said) > 1, f"it says {words}")
         assert all(word in self.said[-1] for word in words), self.said[-1]
         return self.said[-1]
 
 
 @pytest.fixture
 def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Desk:
-    monkeypatch.setattr(inbox, "_STILL", STILL)
-    monkeypatch.setattr(inbox, "_POLL", 0.02)
-    return Desk(tmp_path)
+    desk = Desk(tmp_path)
+    monkeypatch.setattr(inbox, "time", desk.clock)
+    return desk
 
 
 def put(path: Path, text: str, age: float = 0.0) -> None:
@@ -73,7 +101,7 @@ def test_a_log_is_taken_once_it_grows_no_more(desk: Desk) -> None:
     for part in range(3):
         with desk.log.open("a") as file:
             file.write(f"part {part}\n")
-        time.sleep(STILL / 2)
+        desk.clock.forward(STILL / 2)
     assert desk.taken() == "part 0\npart 1\npart 2\n"
     assert desk.motion.read_text() == "t\n0\n"
     assert desk.said == [f"play {desk.motion} (12 s) and put its log there as m_log.csv"]
@@ -87,7 +115,7 @@ def test_a_copy_that_pauses_is_not_cut_in_two(desk: Desk) -> None:
     with desk.log.open("w") as file:
         file.write("first half, ")
         file.flush()
-        time.sleep(5 * STILL)
+        desk.clock.forward(5 * STILL)
         file.write("second half")
     assert desk.taken() == "first half, second half"
 
@@ -187,7 +215,7 @@ def interrupted(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(inbox.time, "sleep", stop)
+        patch.setattr(desk.clock, "sleep", stop)
         with pytest.raises(KeyboardInterrupt):
             Inbox(desk.box, lambda text: None).take(desk.take)
 

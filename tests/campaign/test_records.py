@@ -8,9 +8,9 @@ from excite_cli.campaign.records import (
     STATE,
     Asked,
     Campaign,
-    Learned,
     PlayedMotion,
     Round,
+    RoundFindings,
     read_campaign,
     write_campaign,
 )
@@ -25,7 +25,13 @@ WHOLE = Campaign(
     "/somewhere",
     "print",
     Asked(0.3, 5, 100.0, False, True),
-    (Round(1, MOTIONS, Learned(0.1, 0.02, ("spring on elbow",), ("a or b",), ("a or b",), 0.3)),),
+    (
+        Round(
+            1,
+            MOTIONS,
+            RoundFindings(0.1, 0.02, ("spring on elbow",), ("a or b",), ("a or b",), 0.3),
+        ),
+    ),
     "budget",
     "spent",
     {"excite": "1"},

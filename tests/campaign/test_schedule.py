@@ -3,7 +3,7 @@
 import pytest
 
 from excite_cli.api.loading import load_case
-from excite_cli.campaign.schedule import looked_for, pace_of
+from excite_cli.campaign.records import looked_for, pace_of
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.effects.spring import Spring
 from tests.cli.program import SMOKE

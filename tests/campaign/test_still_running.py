@@ -22,9 +22,9 @@ pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="ne
 _WITHOUT_FORCE = """
 import signal, sys
 sys.path[:] = sys.argv[1:]
-from excite_cli.campaign import escalation, supervisor
-send = escalation.send_to_all
-escalation.send_to_all = lambda *given: None if given[2] == signal.SIGKILL else send(*given)
+from excite_cli.campaign import processes, supervisor
+send = processes.send_to_all
+processes.send_to_all = lambda *given: None if given[2] == signal.SIGKILL else send(*given)
 supervisor.serve()
 """
 DEAF = """

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from excite_cli.checks import rows
-from excite_cli.checks.look import look
+from excite_cli.checks.all_checks import look
 from excite_cli.checks.own import GROUP, own_checks
 from excite_cli.config.load import load_spec
 from excite_cli.errors import ExciteWarning

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from excite_cli.api.loading import Case, load_data
-from excite_cli.checks.look import check_dataset
+from excite_cli.checks.all_checks import check_dataset
 from excite_cli.config.load import load_spec
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.regressor import InverseDynamics
@@ -17,7 +17,7 @@ from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.measurement.hdf5_writer import write_dataset
 from excite_cli.robot.model import Array, Robot
-from excite_cli.simulation.planted import plant
+from excite_cli.simulation.ground_truth import plant
 from excite_cli.simulation.simulate import simulate
 from tests.simulation.arms import IDEAL, arm, motion
 

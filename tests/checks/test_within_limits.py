@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from excite_cli.checks.samples import Samples
-from excite_cli.checks.set_up import beyond_limits
+from excite_cli.checks.set_up_search import beyond_limits
 from excite_cli.checks.setup import Setup
 from excite_cli.robot.model import Robot
 from tests.simulation.arms import arm

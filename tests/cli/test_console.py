@@ -22,7 +22,7 @@ from excite_cli.cli.start_line import Best
 from excite_cli.errors import FileError
 from excite_cli.excitation.progress import Figure, Measure, Progress, Stage
 from excite_cli.export.motions import MOTION_EXPORTERS
-from excite_cli.robot.glance import known_robots
+from excite_cli.robot.overview import known_robots
 
 NAME = "a_very_long_name_of_a_joint_that_someone_wants_to_copy"
 

@@ -105,13 +105,15 @@ def test_json_is_as_promised(outcome: Outcome) -> None:
 
 def test_parts_add_up_to_the_fall_of_the_error(outcome: Outcome) -> None:
     answer, error = outcome.answer, outcome.answer["error"]
-    assert (error["begins"], error["inertias_take_off"]) == ("before", {})
+    assert (error["baseline"], error["inertias_error_reduction"]) == ("before", {})
     for joint in JOINTS:
-        parts = sum(each["takes_off"][joint] for each in answer["effects"])
+        parts = sum(each["error_reduction"][joint] for each in answer["effects"])
         before, after = (error[when]["relative_moving"][joint] for when in ("before", "after"))
         assert parts == pytest.approx(before - after, abs=1e-9)
     (elbow,) = (each for each in answer["effects"] if each["joints"] == ["elbow"])
-    assert max(elbow["takes_off"], key=lambda joint: elbow["takes_off"][joint]) == "elbow"
+    assert (
+        max(elbow["error_reduction"], key=lambda joint: elbow["error_reduction"][joint]) == "elbow"
+    )
     assert answer["shares"] == {"friction": pytest.approx(1.0)}
     said = "Friction accounts for nearly all of the unmodelled torque, most on "
     assert answer["answer"].startswith(said)

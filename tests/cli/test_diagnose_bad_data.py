@@ -10,15 +10,15 @@ import pytest
 import yaml
 
 from excite_cli.api.loading import Case, load_data
-from excite_cli.checks.look import check_dataset
+from excite_cli.checks.all_checks import check_dataset
 from excite_cli.config.load import load_spec
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.measurement.hdf5_writer import write_dataset
 from excite_cli.robot.model import Robot, build_robot
+from excite_cli.simulation.ground_truth import plant
 from excite_cli.simulation.planned_motion import PlannedMotion
-from excite_cli.simulation.planted import plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 from excite_cli.trajectory.fourier import FourierTrajectory

@@ -18,7 +18,7 @@ from excite_cli.report.campaign import Campaign
 from excite_cli.report.margin_section import margin_section
 from excite_cli.report.motion_figure import draw_margins
 from excite_cli.report.motion_section import motion_section
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 from excite_cli.view.instants import instants_of
 from excite_cli.view.scene import build_scene
 

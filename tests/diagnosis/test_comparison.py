@@ -8,22 +8,22 @@ import pytest
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.comparison import Comparison
+from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.diagnosis.sufficient import sufficient
 from excite_cli.diagnosis.textbook import everyday, textbook
-from excite_cli.diagnosis.tracing import Traced
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array
 from tests.diagnosis.explicit_data import FOLDS, prepared, usual_of_unit_columns
-from tests.diagnosis.test_doubt import planted, traced
+from tests.diagnosis.test_misspecification import planted, traced
 
 SAMPLES = 400
 FIXED = 3
 
 
-def traced_of(sizes: Sequence[tuple[Effect, float]], seed: int = 0) -> Traced:
+def traced_of(sizes: Sequence[tuple[Effect, float]], seed: int = 0) -> SearchResult:
     """A joint's torque of random columns of these effects times their sizes, and unit noise."""
     rng = np.random.default_rng(seed)
     declared = [rng.normal(size=(SAMPLES, 1, FIXED)) for _ in FOLDS]
@@ -52,7 +52,7 @@ def traced_of(sizes: Sequence[tuple[Effect, float]], seed: int = 0) -> Traced:
     return replace(found, usual=usual_of_unit_columns(1, FIXED))
 
 
-def models_of(given: Traced) -> Comparison:
+def models_of(given: SearchResult) -> Comparison:
     every = range(len(given.candidates))
     return Comparison(given.data, given.candidates, every, given.levels)
 
@@ -63,7 +63,7 @@ def effect(kind: str, runs: tuple[str, ...] = ()) -> Effect:
 
 def everyday_traced(
     offset: float, armature: float, spring: float = 0.0, friction: float = 1.0
-) -> Traced:
+) -> SearchResult:
     kinds = {
         "viscous_friction": friction,
         "coulomb_friction": friction,
@@ -93,7 +93,7 @@ def test_what_one_run_shows_is_not_in_a_new_recording() -> None:
     assert models.difference([], [1]).of_error > 0.0
 
 
-def alone(given: Traced, q: Array) -> Traced:
+def alone(given: SearchResult, q: Array) -> SearchResult:
     """The same samples, as parts of one recording in which the joint is at q (M,)."""
     at = np.split(q[:, None], len(FOLDS))
     runs = (replace(r, run=RunId("log"), q=own) for r, own in zip(given.data.runs, at, strict=True))
@@ -131,7 +131,7 @@ def test_offset_and_armature_are_in_the_textbook_where_data_ask(
     assert everyday(given.candidates) == [0, 1, 2, 3]
 
 
-def chosen(given: Traced, found: Sequence[int]) -> set[int]:
+def chosen(given: SearchResult, found: Sequence[int]) -> set[int]:
     models = models_of(given)
     plain = textbook(given.candidates, models)
     return set(sufficient(replace(given, chosen=tuple(found), plain=tuple(plain)), models))

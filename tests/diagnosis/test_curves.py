@@ -8,7 +8,7 @@ pytest.importorskip("mujoco")
 from benchmarks.battery.outside import HardeningSpring
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.robot.model import Array
-from excite_cli.simulation.planted import plant
+from excite_cli.simulation.ground_truth import plant
 from tests.diagnosis.test_changes import ELBOW
 from tests.diagnosis.test_friction_with_memory import diagnosed, names
 from tests.effects.motions import signals_of

@@ -310,7 +310,7 @@ def test_what_was_weighed_tells_a_gain_that_the_inertias_hold(std: float) -> Non
     evidence = data.evidence([gain], autoregression())
     rows = rows_of(data, [gain], autoregression(), known)
     told = evidence.schur(()).singles[0]
-    assert evidence.schur(()).told_by_weight(0)
+    assert evidence.schur(()).identified_by_prior_only(0)
     saved = rows.energy((), with_known=True) - rows.energy((0,), with_known=True)
     assert told.chi2 == pytest.approx(saved, rel=1e-5)
     assert told.dof == evidence.schur(()).gain(0).dof == 1
@@ -324,13 +324,13 @@ def test_without_weight_a_gain_is_absorbed_and_beside_itself_it_is_not_told_agai
     free = replace(data, prior=None, weighed=None).evidence([gain], WHITE)
     kept = replace(data, weighed=None).evidence([gain], WHITE)  # by a prior, not a scale
     assert free.schur(()).singles[0].dof == 0
-    assert not free.schur(()).told_by_weight(0)
-    assert not kept.schur(()).told_by_weight(0)
-    assert not data.evidence([gain, gain], WHITE).schur((0,)).told_by_weight(1)
+    assert not free.schur(()).identified_by_prior_only(0)
+    assert not kept.schur(()).identified_by_prior_only(0)
+    assert not data.evidence([gain, gain], WHITE).schur((0,)).identified_by_prior_only(1)
 
 
 def test_data_that_tell_an_effect_themselves_are_not_said_to_need_a_weight() -> None:
     data, gain, _ = of_a_wrong_scale(0.3)
     (other, *_) = random_candidates(4)
     schur = data.evidence([gain, other], WHITE).schur(())
-    assert [schur.told_by_weight(i) for i in (0, 1)] == [True, False]
+    assert [schur.identified_by_prior_only(i) for i in (0, 1)] == [True, False]

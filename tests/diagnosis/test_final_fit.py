@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.final_fit import FinalFit, final_fit, over_error
-from excite_cli.diagnosis.tracing import Traced
+from excite_cli.diagnosis.final_fit import FinalFit, final_fit, signal_to_error
+from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.identification.least_squares import fit_rows
-from tests.diagnosis.test_doubt import planted, traced
+from tests.diagnosis.test_misspecification import planted, traced
 
 
-def told(given: Traced) -> FinalFit:
+def told(given: SearchResult) -> FinalFit:
     return final_fit(given, fit_rows(given.data.rows(given.candidates, given.chosen)))
 
 
@@ -29,7 +29,7 @@ def test_sizes_are_told_beside_two_standard_deviations() -> None:
     data, candidates = planted(effects, torque)
     given = traced(data, candidates, (0, 1, 2))
     found = told(given)
-    sizes = over_error(given, found)
+    sizes = signal_to_error(given, found)
     assert {i for i, size in sizes.items() if size > 1.0} == {0, 1}
     assert found.parameters[-3:-1] == pytest.approx([3.0, 1.0], abs=0.1)
     assert found.covariance.shape == (len(found.parameters),) * 2
@@ -88,6 +88,6 @@ def test_a_shape_that_physics_refuses_makes_no_size_uncertain() -> None:
     data, candidates = planted(effects, np.array([[2.0, 2.0], [0.0, 0.0]]), mix)
     found = told(traced(data, candidates, (0,), lambda x, chosen, added: 1 not in added))
     both = traced(data, candidates, (0,))
-    assert over_error(both, told(both))[0] < 1.0
+    assert signal_to_error(both, told(both))[0] < 1.0
     assert found.parameters[-2] == pytest.approx(2.0, abs=0.1)
     assert np.sqrt(found.covariance[-2, -2]) < 0.1

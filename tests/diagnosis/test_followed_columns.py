@@ -43,7 +43,7 @@ from tests.diagnosis.test_changes import (
 pytest.importorskip("mujoco")
 
 from excite_cli.simulation.covariate_series import CovariateSeries
-from excite_cli.simulation.planted import plant
+from excite_cli.simulation.ground_truth import plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 
@@ -170,7 +170,7 @@ def test_with_the_column_the_held_out_error_is_that_of_noise_and_without_it_more
 ) -> None:
     joint = "shoulder_pitch"
     assert told.after.relative_moving[joint] < 0.02 < 0.04 < untold.after.relative_moving[joint]
-    assert not told.joints_left
+    assert not told.joints_with_residual
 
 
 def test_without_the_column_a_change_over_time_is_named(untold: Diagnosis) -> None:

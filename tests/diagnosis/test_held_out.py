@@ -21,8 +21,8 @@ from tests.cli.program import SMOKE
 
 pytest.importorskip("mujoco")
 
+from excite_cli.simulation.ground_truth import Planted, plant
 from excite_cli.simulation.planned_motion import PlannedMotion
-from excite_cli.simulation.planted import Planted, plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 from excite_cli.trajectory.fourier import FourierTrajectory

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from excite_cli.diagnosis.structure import histories
+from excite_cli.diagnosis.residual_predictability import histories
 from excite_cli.robot.model import Array
 
 SHARES = (0.05, 0.15, 0.4)

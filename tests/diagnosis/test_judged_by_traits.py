@@ -16,7 +16,7 @@ from excite_cli.diagnosis.in_runs import SeenRuns
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.search import Search
-from excite_cli.diagnosis.tracing import _usual
+from excite_cli.diagnosis.search_loop import _usual
 from excite_cli.effects.base import Effect, Signals, Tier
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.identification.declared_states import LeftOut

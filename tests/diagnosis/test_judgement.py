@@ -127,7 +127,7 @@ def test_the_price_is_what_chance_makes_of_all_tests(
     one = effect(kind)
     data, [candidate] = planted([one], np.ones((1, len(one.parameters))), np.zeros((1, 2)))
     judge = judge_of(data, [replace(candidate, tests=tests)], Rules(0.03, 0.01, inflation))
-    threshold = (judge.price(0, dof) - one.surprise) / inflation
+    threshold = (judge.price(0, dof) - one.prior_cost) / inflation
     assert tests * chi2.sf(threshold, dof) == pytest.approx(0.03)
     assert judge.price(0, 0) == judge.price(0, 1)
 
@@ -409,7 +409,7 @@ def test_a_gain_that_takes_a_weight_to_be_told_need_not_lower_the_error(
     gain: float, std: float, expected: Verdict
 ) -> None:
     judge = weighed(gain, std, [effect("torque_gain")])
-    assert judge.told_by_weight(0, [])
+    assert judge.identified_by_prior_only(0, [])
     assert judge.left_out_gain([], [0]) < 0.01
     assert judge.verdict([], [0]) == expected
     assert (0 in judge.failing([0])) == (expected is not Verdict.ACCEPTED)
@@ -419,7 +419,7 @@ def test_a_gain_that_takes_a_weight_to_be_told_need_not_lower_the_error(
 def test_without_a_weight_or_one_that_is_hardly_known_a_gain_has_no_name(std: float) -> None:
     """40 of a gain beside 30 of the scales; or inertias take it up."""
     judge = weighed(0.04, std, [effect("torque_gain")])
-    assert judge.told_by_weight(0, []) == (std > 0.0)
+    assert judge.identified_by_prior_only(0, []) == (std > 0.0)
     assert 0 in judge.failing([0])
     assert Search(judge).run() == []
 
@@ -435,5 +435,5 @@ def test_of_what_a_weight_tells_as_well_the_gain_of_all_rows_is_named() -> None:
     for i, alone in enumerate(effects[:2]):
         extra = judge.price(i, 1) - weighed(0.04, 0.3, [alone]).price(0, 1)
         assert extra > 20.0  # as much as none of the three could save by chance
-    assert not judge.told_by_weight(0, [])  # an offset alone is judged by the error
-    assert not judge.told_by_weight(1, [2])  # what is named already is not told again
+    assert not judge.identified_by_prior_only(0, [])  # an offset alone is judged by the error
+    assert not judge.identified_by_prior_only(1, [2])  # what is named already is not told again

@@ -26,7 +26,7 @@ from tests.effects import own_package
 pytest.importorskip("mujoco")
 
 from excite_cli.simulation.build import assemble
-from excite_cli.simulation.planted import Planted, plant
+from excite_cli.simulation.ground_truth import Planted, plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 
@@ -101,7 +101,7 @@ def test_it_is_found_under_its_own_name_among_all_kinds(named: Callable[..., Nam
 @pytest.mark.parametrize(
     ("trait", "value"),
     [
-        ("surprise", 1e9),
+        ("prior_cost", 1e9),
         ("possible", lambda self, values: float(np.hypot(*values)) < 1.0),
     ],
 )

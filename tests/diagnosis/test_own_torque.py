@@ -9,10 +9,10 @@ import pytest
 from excite_cli.diagnosis import own_torque
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.own_torque import at_its_own_torque
-from excite_cli.diagnosis.tracing import Traced
+from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.robot.model import Array
-from tests.diagnosis.test_doubt import planted, traced
 from tests.diagnosis.test_final_fit import one
+from tests.diagnosis.test_misspecification import planted, traced
 
 
 @pytest.mark.parametrize("gain", [0.1, -0.3, 0.6])
@@ -37,7 +37,7 @@ def test_a_gain_of_what_is_found_beside_it_is_fitted_as_it_predicts(
         own = tuple(n + each for n, each in zip(now, load, strict=True))
         return [*candidates[:2], replace(candidates[2], columns=own)]
 
-    def with_columns(given: Traced, bodies: Any, theta: Array) -> Traced:
+    def with_columns(given: SearchResult, bodies: Any, theta: Array) -> SearchResult:
         return replace(given, candidates=tuple(at(theta)))
 
     monkeypatch.setattr(own_torque, "_with_columns", with_columns)

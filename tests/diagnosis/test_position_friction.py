@@ -16,7 +16,7 @@ from tests.cli.program import SMOKE
 
 pytest.importorskip("mujoco")
 
-from excite_cli.simulation.planted import plant
+from excite_cli.simulation.ground_truth import plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 from tests.diagnosis.test_changes import ELBOW, PITCH, motion

@@ -80,7 +80,7 @@ def cost(rows: Rows, candidates: Sequence[Candidate], chosen: Sequence[int]) -> 
             price += 4.5
         else:
             family = chi2.isf(0.01 / candidates[i].tests, candidates[i].width)
-            price += family + own.surprise
+            price += family + own.prior_cost
     return rows.energy(chosen) + price
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from excite_cli.diagnosis.noise_model import NoiseModel
-from excite_cli.diagnosis.tracing import Fit, _of_best_shapes
+from excite_cli.diagnosis.search_loop import Fit, _of_best_shapes
 from excite_cli.effects.base import Effect
 from tests.diagnosis.explicit_data import effect
 from tests.diagnosis.test_judgement import on_joint_0, planted

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.single_runs import assumptions, differences_told
-from excite_cli.diagnosis.tracing import Traced
+from excite_cli.diagnosis.search_loop import SearchResult
+from excite_cli.diagnosis.single_runs import assumptions, differences_between_runs
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.identification.split import Split
 from excite_cli.measurement.dataset import Run
 from excite_cli.measurement.run_identity import Part, RunId
 from tests.diagnosis.explicit_data import prepared
-from tests.diagnosis.test_doubt import traced
+from tests.diagnosis.test_misspecification import traced
 
 JOINTS = ("a", "b")
 
@@ -48,7 +48,7 @@ def test_of_a_held_out_run_that_is_not_among_its_runs_an_effect_is_taken_to_be_a
     assert [(each.kind, each.present) for each in found] == [("contact", False)] * told
 
 
-def two_recordings(offset: float, runs: tuple[str, str] = ("a", "b")) -> Traced:
+def two_recordings(offset: float, runs: tuple[str, str] = ("a", "b")) -> SearchResult:
     """Four parts of two recordings; joint 0 of the first has so much more offset, noise is one."""
     columns = [np.ones((80, 1, 1)) * (part < 2) for part in range(4)]
     rng = np.random.default_rng(3)
@@ -65,12 +65,12 @@ def two_recordings(offset: float, runs: tuple[str, str] = ("a", "b")) -> Traced:
 
 
 def test_by_what_two_recordings_differ_is_told_in_one_line() -> None:
-    (told,) = differences_told(two_recordings(5.0))
+    (told,) = differences_between_runs(two_recordings(5.0))
     assert told.kind == "runs_differ"
     assert re.search(r"a and b differ: torque_offset of elbow by \+[45]\.\d* N·m in a\.", told.text)
     assert "runs: {a: {torque_offset: a}, b: {torque_offset: b}}" in told.text
 
 
 def test_what_is_chance_is_not_told_nor_what_parts_of_one_recording_differ_by() -> None:
-    assert differences_told(two_recordings(0.0)) == ()
-    assert differences_told(two_recordings(5.0, ("a", "a"))) == ()
+    assert differences_between_runs(two_recordings(0.0)) == ()
+    assert differences_between_runs(two_recordings(5.0, ("a", "a"))) == ()

@@ -13,12 +13,12 @@ from excite_cli.diagnosis import sufficient as sufficient_
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.possible_sizes import PossibleSizes
+from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.diagnosis.sufficient import those_that_matter, with_everyday
-from excite_cli.diagnosis.tracing import Traced
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.seen import Seen
 from excite_cli.robot.model import Array, Robot, build_robot
-from tests.diagnosis.test_reach import FAST, SLOW, TORQUE, crept, kind, made, usual
+from tests.diagnosis.test_extrapolation import FAST, SLOW, TORQUE, crept, kind, made, usual
 
 WITHOUT_INERTIAS: Any = SimpleNamespace(base=SimpleNamespace(selection=[]), declared=())
 
@@ -34,7 +34,7 @@ def found_with(
     effects: Sequence[Effect],
     tau: Array,
     level: float,
-) -> Traced:
+) -> SearchResult:
     """The first of these was found, beside noise of this level [N·m]."""
     data, candidates = made(robot, seen, effects, tau)
     noise = NoiseModel.white(np.full(robot.n, level))
@@ -42,7 +42,7 @@ def found_with(
     seen_sizes = Seen(np.full(robot.n, 9.0), np.ones(robot.n), 1.0)
     sizes = PossibleSizes(candidates, evidence.covariance, seen_sizes)
     judge = Judgement(evidence, evidence, candidates, Rules(0.01, 0.01), sizes)
-    return Traced(
+    return SearchResult(
         data, tuple(candidates), noise, judge, (0,), np.zeros(0), (), np.full(robot.n, level),
         1.0, sizes, WITHOUT_INERTIAS, usual(robot, seen),
     )  # fmt: skip
@@ -122,7 +122,6 @@ def test_others_may_say_the_same_without_it(robot: Robot) -> None:
 
 @pytest.mark.parametrize(
     ("missed", "brief", "answer"),
-    [(True, False, [2, 1]), (False, True, [2, 1]), (False, False, [2])],
     [(True, False, [2, 1]), (False, True, [2, 1]), (False, False, [2])],
 )
 def test_what_single_runs_carry_stays_beside_the_textbook_if_its_own_seconds_miss_it(

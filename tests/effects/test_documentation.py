@@ -50,14 +50,14 @@ def test_page_has_no_section_on_what_there_is_not() -> None:
 
 
 def test_page_says_how_every_kind_is_judged() -> None:
-    """Row by row: surprise, when it is asked for, after what, never beside what."""
+    """Row by row: prior_cost, when it is asked for, after what, never beside what."""
     table = PAGE.split("## How a diagnosis judges them")[1].split("\n## ")[0]
     row = r"^\| `(\w+)` \| (\d+) \| (\w+) \| (.*?) ?\| (.*?) ?\|$"
     rows = re.findall(row, table, re.MULTILINE)
     assert [name for name, *_ in rows] == list(catalogue())
-    for name, surprise, when, *others in rows:
+    for name, prior_cost, when, *others in rows:
         kind = catalogue()[name]
-        assert float(surprise) == kind.surprise
+        assert float(prior_cost) == kind.prior_cost
         assert when == ("first", "then", "last")[kind.tier - 1]
         assert [tuple(re.findall(r"\w+", each)) for each in others] == [kind.refines, kind.excludes]
 
@@ -66,10 +66,10 @@ def test_how_to_names_every_trait_with_its_default() -> None:
     page = own_package.PAGE.read_text(encoding="utf-8")
     follows = {"joints", "runs", "kind", "active", "exclusive_with", "torque"}
     follows |= {"is_change", "is_searched", "asked_for", "builds_on"}
-    follows |= {"over_error", "why_impossible", "report_on"}
+    follows |= {"signal_to_error", "why_impossible", "report_on"}
     stated = {name for name in vars(Effect) if not name.startswith("_")} - follows
     assert sorted(name for name in stated if name not in page) == []
-    assert f"| {Effect.surprise:g} |" in page
+    assert f"| {Effect.prior_cost:g} |" in page
     assert f"`{Effect.tier.name}` |" in page
 
 

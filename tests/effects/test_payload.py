@@ -14,7 +14,7 @@ from excite_cli.effects.placing import places_named, told_on
 from excite_cli.errors import ConfigError
 from excite_cli.robot.link_frame import LinkFrame, leaves, link_frame
 from excite_cli.robot.model import Array, Robot
-from excite_cli.simulation.planted import parse_planted
+from excite_cli.simulation.ground_truth import parse_planted
 from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
 

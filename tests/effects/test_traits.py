@@ -37,7 +37,7 @@ def test_traits_name_only_kinds_of_the_catalogue(name: str) -> None:
     named = {*kind.refines, *kind.excludes, *kind.same_as, *kind.deviates_from, *kind.changes_of}
     named |= set(kind.varies)
     assert named <= set(NAMES) - {name}
-    assert kind.surprise >= 0.0
+    assert kind.prior_cost >= 0.0
     assert not set(kind.settings) & {p.name for p in (*kind.parameters, *kind.shapes)}
     assert not kind.known_by or kind.known_by in {p.name for p in kind.shapes}
 
@@ -45,14 +45,14 @@ def test_traits_name_only_kinds_of_the_catalogue(name: str) -> None:
 def test_what_every_robot_has_is_free_and_asked_for_first() -> None:
     for name, kind in KINDS.items():
         assert (kind.tier == Tier.EVERY_ROBOT) == (name in STRAIGHT)
-        assert (kind.surprise == 0.0) == (name in STRAIGHT)
+        assert (kind.prior_cost == 0.0) == (name in STRAIGHT)
 
 
 def test_kinds_that_come_near_anything_are_asked_for_last_and_dear() -> None:
-    dearest = max(kind.surprise for kind in KINDS.values() if kind.tier < Tier.LAST)
+    dearest = max(kind.prior_cost for kind in KINDS.values() if kind.tier < Tier.LAST)
     for name in ("contact", "cable_force", "friction_drift"):
         assert KINDS[name].tier == Tier.LAST
-        assert KINDS[name].surprise >= dearest
+        assert KINDS[name].prior_cost >= dearest
 
 
 def test_what_is_refined_is_asked_for_before_or_with_its_refinement() -> None:

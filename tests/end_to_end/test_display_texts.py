@@ -32,7 +32,7 @@ from tests.diagnosis.test_held_out import motion
 
 pytest.importorskip("mujoco")
 
-from excite_cli.simulation.planted import plant
+from excite_cli.simulation.ground_truth import plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 

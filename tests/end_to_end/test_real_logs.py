@@ -152,7 +152,11 @@ class TestKr300:
 
     def test_names(self, diagnosed: Any) -> None:
         answer = diagnosed("kr300", "kr300.h5", "--held-out", "C")
-        assert len(named(answer, "viscous_friction")) == 6
+        lines = {each["joint"]: each for each in answer["friction_lines"]}
+        assert sorted(lines) == [f"axis_{k}" for k in range(1, 7)]
+        for each in lines.values():
+            for size in (each["viscous"], each["coulomb"]):
+                assert size["value"] > 4 * size["std"]
         assert ("axis_3",) in named(answer, "armature")
         assert ("axis_2",) in named(answer, "spring")
 

@@ -18,8 +18,7 @@ from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack
 from excite_cli.trajectory.base import Array, Trajectory
-from excite_cli.trajectory.chain import Chain, Segment
-from excite_cli.trajectory.fade import Fade
+from excite_cli.trajectory.fade import Chain, Fade, Segment
 from excite_cli.trajectory.point_to_point import PointToPoint
 from tests.excitation.test_path_search import ACROSS, TABLE
 

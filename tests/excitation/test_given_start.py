@@ -8,15 +8,14 @@ import pytest
 from excite_cli.config.load import load_spec
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.base_motion import base_motion
-from excite_cli.excitation.given_start import start_from
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.planned_prior import planned_stack
 from excite_cli.excitation.problem import build_problem
 from excite_cli.excitation.run import continue_run, new_result
-from excite_cli.excitation.start import random_start
+from excite_cli.excitation.start import random_start, start_from
 from excite_cli.excitation.task import MotionTask
 from excite_cli.trajectory.bspline import BSplineTrajectory
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 from excite_cli.trajectory.sampled import through_samples
 
 CONFIG = Path(__file__).parents[2] / "configs" / "smoke.yaml"

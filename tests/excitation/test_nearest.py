@@ -12,7 +12,7 @@ from excite_cli.excitation.nearest import closest_time, nearest_bodies
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.geometry.coal_distances import CoalDistances
 from excite_cli.geometry.link_meshes import Poses
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 
 AT = np.array([1.0])
 CONFIG = Path(__file__).parents[2] / "configs" / "smoke.yaml"

@@ -4,7 +4,7 @@ import numpy as np
 
 from excite_cli.export.timed import timed_motion
 from excite_cli.measurement.timed_motion import TimedMotion
-from excite_cli.trajectory.chain import Chain, Segment
+from excite_cli.trajectory.fade import Chain, Segment
 from excite_cli.trajectory.fourier import FourierTrajectory
 
 # Names that a careless writer of YAML, CSV or JSON trips over.

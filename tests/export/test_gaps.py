@@ -1,6 +1,6 @@
 """Templates with gaps: what is put into one is never taken for another."""
 
-from excite_cli.export.gaps import filled
+from excite_cli.export.c_model import filled
 
 
 def test_what_is_put_in_is_not_filled_again() -> None:

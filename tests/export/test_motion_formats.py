@@ -18,7 +18,7 @@ from excite_cli.measurement.csv_table import read_table
 from excite_cli.measurement.motion_bag import MESSAGE
 from excite_cli.measurement.motion_files import read_motion
 from excite_cli.trajectory.bspline import BSplineTrajectory
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 from excite_cli.trajectory.sampled import through_samples
 from tests.export.motions import JOINTS, chain, motion
 

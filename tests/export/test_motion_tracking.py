@@ -17,7 +17,7 @@ from excite_cli.export.timed import timed_motion
 from excite_cli.measurement.motion_files import read_motion
 from excite_cli.measurement.timed_motion import TimedMotion
 from excite_cli.simulation.mujoco_model import build_plant
-from excite_cli.trajectory.chain import Chain, Segment
+from excite_cli.trajectory.fade import Chain, Segment
 
 mujoco = pytest.importorskip("mujoco")
 CONFIG = Path(__file__).parents[2] / "configs" / "smoke.yaml"

@@ -18,7 +18,7 @@ from excite_cli.geometry.obstacle_distances import ObstacleDistances
 from excite_cli.geometry.obstacle_pairs import ObstaclePairs, choose_obstacle_pairs
 from excite_cli.geometry.obstacles import build_obstacles
 from excite_cli.geometry.reasons import Why, reason_in_words
-from excite_cli.robot.carried import carried_bodies
+from excite_cli.robot.carried_bodies import carried_bodies
 from excite_cli.robot.model import Robot, build_robot
 from tests.robot.random_robots import random_robot
 

@@ -7,7 +7,7 @@ from benchmarks.coal_gradients import CoalGradients
 from excite_cli.constraints.self_collision import Clearance
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.geometry.collision_pairs import CollisionPairs
-from excite_cli.geometry.segments import nearest_points, normals
+from excite_cli.geometry.world_segments import nearest_points, normals
 from excite_cli.robot.capsule import Capsule
 
 from .fitted_robots import capsules_of, pairs_of, robot_of

@@ -24,7 +24,7 @@ from tests.cli.program import SMOKE
 
 pytest.importorskip("mujoco")
 
-from excite_cli.simulation.planted import Planted, plant
+from excite_cli.simulation.ground_truth import Planted, plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 from tests.diagnosis.test_changes import motion

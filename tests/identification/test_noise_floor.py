@@ -65,8 +65,8 @@ def simulated(
 ) -> Dataset:
     """Motions, four periods each, on an arm with an effect that the model knows nothing of."""
     pytest.importorskip("mujoco")
+    from excite_cli.simulation.ground_truth import plant
     from excite_cli.simulation.planned_motion import PlannedMotion
-    from excite_cli.simulation.planted import plant
     from excite_cli.simulation.settings import SimulationSettings
     from excite_cli.simulation.simulate import simulate
 

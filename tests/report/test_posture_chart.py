@@ -10,7 +10,7 @@ from excite_cli.excitation.nearest import closest_time
 from excite_cli.geometry.coal_distances import CoalDistances
 from excite_cli.report.campaign import Campaign, in_figures
 from excite_cli.report.posture_chart import posture_chart
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 from tests.report.case import Case
 
 PATH = re.compile(

@@ -3,7 +3,7 @@
 import re
 
 from excite_cli.report.robot_chart import robot_chart
-from excite_cli.robot.skeleton import Skeleton
+from excite_cli.robot.tree import Skeleton
 
 ARM = Skeleton(
     base=(0.0, 0.0, 0.0),

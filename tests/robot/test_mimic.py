@@ -15,11 +15,11 @@ from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.excitation.boundary import posture_of as boundary_posture
-from excite_cli.robot.carried import MovedBodies
-from excite_cli.robot.glance import describe
+from excite_cli.robot.carried_bodies import MovedBodies
 from excite_cli.robot.link_frame import leaves, link_frame, own_link
 from excite_cli.robot.model import Robot, build_robot
-from excite_cli.robot.skeleton import skeleton_of
+from excite_cli.robot.overview import describe
+from excite_cli.robot.tree import skeleton_of
 from tests.robot.coupled_robots import CLAW, HAND, coupled_robot, urdf_of
 
 

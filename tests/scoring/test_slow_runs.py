@@ -12,8 +12,8 @@ from excite_cli.config.load import load_spec
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.robot.model import build_robot
+from excite_cli.simulation.ground_truth import Planted, plant
 from excite_cli.simulation.planned_motion import PlannedMotion
-from excite_cli.simulation.planted import Planted, plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 from excite_cli.summary.score import runs_table, score_data, sentences

@@ -10,8 +10,8 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.measurement.dataset import Run
 from excite_cli.robot.model import Array, Robot, build_robot
+from excite_cli.simulation.ground_truth import Planted, plant
 from excite_cli.simulation.planned_motion import PlannedMotion
-from excite_cli.simulation.planted import Planted, plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import Simulation, simulate
 from excite_cli.trajectory.fourier import FourierTrajectory

@@ -9,7 +9,7 @@ from excite_cli.errors import ConfigError
 from excite_cli.robot.model import Robot
 from excite_cli.simulation.build import assemble
 from excite_cli.simulation.covariate_series import CovariateSeries, parse_series
-from excite_cli.simulation.planted import parse_planted
+from excite_cli.simulation.ground_truth import parse_planted
 from tests.simulation.arms import arm
 
 

@@ -18,8 +18,8 @@ from excite_cli.effects.catalogue import catalogue
 from excite_cli.errors import RobotError
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.build import assemble
+from excite_cli.simulation.ground_truth import Planted, plant
 from excite_cli.simulation.planned_motion import PlannedMotion
-from excite_cli.simulation.planted import Planted, plant
 from excite_cli.simulation.simulate import Simulation, simulate
 from tests.simulation.arms import (
     ELBOW,

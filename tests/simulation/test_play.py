@@ -13,9 +13,9 @@ from excite_cli.errors import ConfigError, MissingExtraError, RobotError
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Robot
 from excite_cli.simulation.build import Build, make
+from excite_cli.simulation.ground_truth import plant
 from excite_cli.simulation.mujoco_model import silent_engine
 from excite_cli.simulation.planned_motion import PlannedMotion
-from excite_cli.simulation.planted import plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 from excite_cli.trajectory.bspline import BSplineTrajectory

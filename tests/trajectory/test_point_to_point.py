@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from excite_cli.trajectory.base import Array, Trajectory
-from excite_cli.trajectory.chain import Chain, Segment
-from excite_cli.trajectory.fade import Fade
+from excite_cli.trajectory.fade import Chain, Fade, Segment
 from excite_cli.trajectory.fourier import FourierTrajectory
 from excite_cli.trajectory.point_to_point import PointToPoint, at_rest_between
 

@@ -10,7 +10,7 @@ from scipy.interpolate import make_interp_spline
 
 from excite_cli.trajectory.base import Trajectory
 from excite_cli.trajectory.bspline import BSplineTrajectory
-from excite_cli.trajectory.chain import Chain, Segment
+from excite_cli.trajectory.fade import Chain, Segment
 from excite_cli.trajectory.fourier import FourierTrajectory
 from excite_cli.trajectory.sampled import SampledTrajectory, through_samples
 from excite_cli.trajectory.slowed import Slowed

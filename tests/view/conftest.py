@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_limits
 
 from excite_cli.config.load import load_spec
 from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 
 CONFIG = Path(__file__).parents[2] / "configs" / "smoke.yaml"
 AROUND = [

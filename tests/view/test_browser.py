@@ -10,7 +10,7 @@ import pytest
 
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.problem import Problem
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 from excite_cli.view.browser import (
     Serving,
     _Player,

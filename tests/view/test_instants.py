@@ -8,7 +8,7 @@ from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.coal_distances import CoalDistances
 from excite_cli.robot.model import Array
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 from excite_cli.view.instants import Instants, instants_of
 
 TIMES = np.linspace(0.0, 6.0, 41)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from excite_cli.excitation.problem import Problem
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 from excite_cli.view import pictures
 from excite_cli.view.pictures import View, motion_gif, still_png
 from excite_cli.view.studio import QUICK

@@ -7,7 +7,7 @@ import pytest
 from excite_cli.config.load import load_spec
 from excite_cli.excitation.problem import Problem
 from excite_cli.robot.model import Robot, build_robot
-from excite_cli.trajectory.chain import Segment
+from excite_cli.trajectory.fade import Segment
 from excite_cli.view.geometry import robot_bodies
 from excite_cli.view.scene import Scene, build_scene
 from excite_cli.view.surface import box_triangles

@@ -7,7 +7,7 @@ from excite_cli.excitation.entry import program
 from excite_cli.excitation.problem import Problem
 from excite_cli.robot.model import Array, Robot
 from excite_cli.shown.note import Level, Note, Tell
-from excite_cli.trajectory.chain import Chain, Segment
+from excite_cli.trajectory.fade import Chain, Segment
 
 # Positions by joint [rad, m]; joints not named are at robot.posture.
 Start = Mapping[str, float]

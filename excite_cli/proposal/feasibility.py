@@ -35,7 +35,7 @@ from excite_cli.geometry.mesh_distances import MeshDistances
 from excite_cli.geometry.mesh_pairs import joined_links
 from excite_cli.geometry.pair_tables import near_at_posture
 from excite_cli.proposal.limits import JointPlan
-from excite_cli.robot.carried import MovedBodies
+from excite_cli.robot.carried_bodies import MovedBodies
 
 # A posture to start from: one that others wrote down, bent and away from limits, then clear.
 

@@ -9,12 +9,12 @@ import pytest
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.covariate import Covariate
-from excite_cli.diagnosis.doubt import approximations
 from excite_cli.diagnosis.judgement import Judgement, Rules
+from excite_cli.diagnosis.misspecification import approximations
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.possible_sizes import PossibleSizes
 from excite_cli.diagnosis.records import Approximation, LargeRest
-from excite_cli.diagnosis.tracing import Traced
+from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
@@ -58,10 +58,10 @@ def traced(
     candidates: Sequence[Candidate],
     chosen: Sequence[int],
     allowed: Allowed = anything,
-) -> Traced:
+) -> SearchResult:
     plain = data.evidence(candidates, ONE)
     judge = Judgement(plain, plain, candidates, Rules(0.01, 0.01), allowed)
-    return Traced(
+    return SearchResult(
         data, tuple(candidates), ONE, judge, tuple(chosen), np.zeros(0), (), np.ones(2), 1.0,
         PossibleSizes(candidates, plain.covariance, Seen(np.ones(2), np.ones(2), 1.0)), NO_MODEL,
         NO_MOTION,

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from excite_cli.diagnosis.high_band import band_noise
+from excite_cli.diagnosis.noise_spectrum import band_noise
 from excite_cli.diagnosis.records import LargeRest
-from excite_cli.diagnosis.structure import Quantities, Structure
+from excite_cli.diagnosis.residual_predictability import Quantities, Structure
+from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.diagnosis.traces import Dependence
-from excite_cli.diagnosis.tracing import Traced
 from excite_cli.identification.noise_floor import NoiseFloor
 from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Mask, Run
@@ -33,7 +33,7 @@ _SMALLEST = 1e-3  # of the torque's RMS: what is smaller needs no word
 
 
 def large_rests(
-    traced: Traced,
+    traced: SearchResult,
     predicted: Sequence[Array],
     residuals: Sequence[Array],
     recorded: Sequence[Run],

@@ -11,7 +11,7 @@ from excite_cli.checks import foreign_runs, rows, sentences, standing_legs
 from excite_cli.checks.own import Log, own_checks
 from excite_cli.checks.result import Result
 from excite_cli.checks.samples import samples_of
-from excite_cli.checks.set_up import CHECKS, mistakes
+from excite_cli.checks.set_up_search import CHECKS, mistakes
 from excite_cli.checks.setup import Setup
 from excite_cli.checks.textbook_fit import TextbookFit
 from excite_cli.checks.trust import but_trusted, is_trusted

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from excite_cli.diagnosis.large_rest import large_rests
+from excite_cli.diagnosis.excess_residual import large_rests
 from excite_cli.diagnosis.records import LargeRest
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Signals

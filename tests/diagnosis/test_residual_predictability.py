@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from excite_cli.diagnosis.covariate import Covariate
-from excite_cli.diagnosis.structure import Quantities, Rest
+from excite_cli.diagnosis.residual_predictability import Quantities, Rest
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Signals
 from excite_cli.measurement.run_identity import RunId

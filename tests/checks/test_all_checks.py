@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from excite_cli.checks.look import check_dataset
+from excite_cli.checks.all_checks import check_dataset
 from excite_cli.config.load import load_spec
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.config.spec import Spec
@@ -17,7 +17,7 @@ from excite_cli.errors import FileError
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.robot.model import Array, Robot, build_robot
-from excite_cli.simulation.planted import Planted, plant
+from excite_cli.simulation.ground_truth import Planted, plant
 from tests.simulation.arms import arm, played
 
 LOGS = Path(__file__).resolve().parents[2] / "data"

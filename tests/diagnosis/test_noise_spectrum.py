@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter, sosfiltfilt
 
-from excite_cli.diagnosis.high_band import BandNoise, band_noise
+from excite_cli.diagnosis.noise_spectrum import BandNoise, band_noise
 from excite_cli.identification.prepare import PreparedRun, prepare
 from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Run

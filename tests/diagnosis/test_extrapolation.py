@@ -8,8 +8,8 @@ import pytest
 
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.diagnosis.candidates import Candidate, with_columns
+from excite_cli.diagnosis.extrapolation import Reach, UsualMotion, torque_seen
 from excite_cli.diagnosis.possible_sizes import PossibleSizes
-from excite_cli.diagnosis.reach import Reach, UsualMotion, torque_seen
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect, Signals

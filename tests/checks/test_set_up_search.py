@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from excite_cli.checks.all_checks import look
 from excite_cli.checks.foreign_runs import foreign_runs
-from excite_cli.checks.look import look
 from excite_cli.checks.result import Result
 from excite_cli.checks.samples import samples_of
 from excite_cli.checks.sentences import BELONG
-from excite_cli.checks.set_up import _candidates
+from excite_cli.checks.set_up_search import _candidates
 from excite_cli.checks.setup import Setup
 from excite_cli.checks.textbook_fit import TextbookFit
 from excite_cli.config.commented_yaml import with_values
@@ -24,7 +24,7 @@ from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.robot.model import Array, Robot
-from excite_cli.simulation.planted import plant
+from excite_cli.simulation.ground_truth import plant
 from tests.simulation.arms import arm, played
 
 SPEC: Spec = load_spec(Path(__file__).resolve().parents[2] / "configs" / "ur10.yaml")

@@ -25,8 +25,8 @@ from excite_cli.identification.averages import average_rows
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Array, Mask, Run
-from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
+from excite_cli.workers.context import each
 
 _BANDS = ((8.0, 14.0), (14.0, 20.0), (20.0, 35.0), (35.0, 60.0), (60.0, 100.0))  # Hz
 _WHITE = 2  # of the bands give the level of white noise

@@ -7,7 +7,7 @@ import pytest
 
 from excite_cli.config.load import load_spec
 from excite_cli.robot.model import Array, build_robot
-from excite_cli.robot.skeleton import Skeleton, skeleton_of
+from excite_cli.robot.tree import Skeleton, skeleton_of
 from tests.cli.program import SMOKE
 
 

@@ -26,8 +26,8 @@ from excite_cli.diagnosis.covariate import Aspect, Covariate
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Signals
 from excite_cli.robot.model import Array
-from excite_cli.workers.at_hand import each
 from excite_cli.workers.base import Tell
+from excite_cli.workers.context import each
 
 # The history of a quantity (hysteresis), by play operators.
 #

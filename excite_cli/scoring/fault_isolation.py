@@ -105,7 +105,7 @@ def _candidates(robot: Robot, run: PreparedRun, signals: Signals, left: Array) -
         axis=1,
     )
     for kind in catalogue().values():
-        if not (kind.per_run or kind.changes_between_runs or kind.may_begin):
+        if not (kind.per_run or kind.changes_between_runs or kind.can_appear_later):
             continue
         for joints in kind.places(robot):
             for shape in kind.tuned(robot, joints, [signals], [at_rate]):

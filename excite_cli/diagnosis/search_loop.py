@@ -17,6 +17,7 @@ import numpy as np
 from excite_cli.config.data_spec import DiagnosisSpec
 from excite_cli.diagnosis.candidates import Candidate, possible_effects, shapes_around, with_columns
 from excite_cli.diagnosis.evidence import Evidence
+from excite_cli.diagnosis.extrapolation import Reach, UsualMotion
 from excite_cli.diagnosis.in_runs import SeenRuns
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.modelled_run import (
@@ -29,7 +30,6 @@ from excite_cli.diagnosis.modelled_run import (
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
 from excite_cli.diagnosis.placebo import placebos_of
 from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
-from excite_cli.diagnosis.reach import Reach, UsualMotion
 from excite_cli.diagnosis.search import Search
 from excite_cli.diagnosis.textbook import everyday, textbook_effects
 from excite_cli.diagnosis.training import TrainingData
@@ -53,7 +53,7 @@ Progress = Callable[[str, int], None]
 
 
 @dataclass(frozen=True)
-class Traced:
+class SearchResult:
     """The outcome: training data, candidates, noise, the judgement, the chosen candidates.
 
     `plain`: candidates of the textbook's model, near which others are where data do not reach.
@@ -122,7 +122,7 @@ def trace(
     progress: Progress,
     start: Sequence[Effect] = (),
     over: Callable[[], bool] = lambda: False,
-) -> tuple[Traced, list[ModelledRun]]:
+) -> tuple[SearchResult, list[ModelledRun]]:
     """Find the effects that `model` lacks; with the runs as it sees them.
 
     What is found when it is `over` is the answer, whatever the passes say.
@@ -150,7 +150,7 @@ def trace(
                 body.take(run, own)
             left_out = wanted
 
-    traced: Traced | None = None
+    traced: SearchResult | None = None
     cuts: Mapping[int, float] = {}
     for attempt in range(_PASSES):
         traced = None  # its columns are gigabytes, of large data: not beside the next ones
@@ -297,7 +297,7 @@ def _first_fit(
     return Fit(phi, tuple(effects), values, levels, evidence.energy(chosen))
 
 
-def fit_of(model: Model, traced: Traced) -> Fit:
+def fit_of(model: Model, traced: SearchResult) -> Fit:
     """What a search found, to begin the next one from."""
     plain = traced.judge.plain
     parameters = plain.solve(traced.chosen)
@@ -310,7 +310,7 @@ def fit_of(model: Model, traced: Traced) -> Fit:
     )
 
 
-def _left_out(traced: Traced) -> float:
+def _left_out(traced: SearchResult) -> float:
     """Logarithm of the RMS that is left of runs left out, mean over the joints."""
     squares = traced.judge.plain.by_fold.energies(traced.chosen).sum(axis=1)
     counts = sum(run.usable.sum(axis=0) for run in traced.data.runs)
@@ -330,7 +330,7 @@ def _one_pass(
     bodies: Sequence["ModelledRun"],
     fit: Fit,
     over: Callable[[], bool],
-) -> Traced:
+) -> SearchResult:
     """Columns and noise as the last fit says, then a search from the textbook's model."""
     effects = (*model.declared, *fit.effects)
     signals = signals_of_all(bodies, fit.phi, effects, fit.values)
@@ -378,7 +378,7 @@ def _one_pass(
     )
     judge = Judgement(white, plain, candidates, rules, sizes, found)
     chosen = _searched(judge, spec.rounds, data, model, over)
-    return Traced(
+    return SearchResult(
         data, tuple(candidates), noise, judge, tuple(chosen), fit.phi, tuple(signals),
         fit.levels, inflation, sizes, model, motion,
     )  # fmt: skip

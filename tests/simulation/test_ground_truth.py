@@ -9,7 +9,7 @@ import pytest
 
 from excite_cli.errors import ConfigError
 from excite_cli.robot.model import Robot
-from excite_cli.simulation.planted import parse_planted
+from excite_cli.simulation.ground_truth import parse_planted
 from tests.simulation.arms import arm
 
 RUNS = {"motion_1": ("motion_1_take_1", "motion_1_take_2"), "motion_2": ("motion_2",)}

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from excite_cli.config.data_spec import DiagnosisSpec
-from excite_cli.diagnosis import tracing
+from excite_cli.diagnosis import search_loop
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.identification.declared_states import LeftOut
 from tests.diagnosis.explicit_data import anything, effect
-from tests.diagnosis.test_doubt import planted
+from tests.diagnosis.test_misspecification import planted
 
 
 class Fit(SimpleNamespace):
@@ -66,27 +66,27 @@ def answer_of(
 
     monkeypatch.setattr(LeftOut, "by", by)
     monkeypatch.setattr(
-        tracing, "ModelledRun", lambda *_: SimpleNamespace(take=lambda run, columns: None)
+        search_loop, "ModelledRun", lambda *_: SimpleNamespace(take=lambda run, columns: None)
     )
     start = Fit(name="declared", places=set(), effects=())
     monkeypatch.setattr(
-        tracing,
+        search_loop,
         "_first_fit",
         lambda *given: fit_of(None, SimpleNamespace(name=known)) if given[-1] else start,
     )
-    monkeypatch.setattr(tracing, "inertial_columns", lambda model, runs: [None for _ in runs])
-    monkeypatch.setattr(tracing, "fit_of", fit_of)
-    monkeypatch.setattr(tracing, "_one_pass", one_pass)
-    monkeypatch.setattr(tracing, "_PASSES", 4)
-    monkeypatch.setattr(tracing, "_left_out", lambda traced: errors[traced.attempt])
+    monkeypatch.setattr(search_loop, "inertial_columns", lambda model, runs: [None for _ in runs])
+    monkeypatch.setattr(search_loop, "fit_of", fit_of)
+    monkeypatch.setattr(search_loop, "_one_pass", one_pass)
+    monkeypatch.setattr(search_loop, "_PASSES", 4)
+    monkeypatch.setattr(search_loop, "_left_out", lambda traced: errors[traced.attempt])
     rest = Fit(name="rest", places={"rest"}, effects=())
-    monkeypatch.setattr(tracing, "beside_cuts", lambda fit: rest)
-    monkeypatch.setattr(tracing, "_without_kinds", lambda spec, effects: spec)
+    monkeypatch.setattr(search_loop, "beside_cuts", lambda fit: rest)
+    monkeypatch.setattr(search_loop, "_without_kinds", lambda spec, effects: spec)
     model: Any = SimpleNamespace(declared=(), vague=False)
     nothing = DiagnosisSpec(rounds=0)
     begin: Any = (known,) if known else ()
     traced: Any
-    traced, _ = tracing.trace(model, nothing, prepared, (), (), lambda *_: None, begin)
+    traced, _ = search_loop.trace(model, nothing, prepared, (), (), lambda *_: None, begin)
     before = began[-1]
     # The answer's own samples: those that the pass before it left.
     assert traced.taken == [(before,) if before != "declared" else ()]
@@ -132,7 +132,7 @@ def test_a_cut_leaves_what_is_beside_it() -> None:
     )
     sizes = [len(each.parameters) for each in effects]
     values = np.concatenate([[0.5, 0.6], *(np.full(w, k) for k, w in enumerate(sizes))])
-    rest = tracing.beside_cuts(tracing.Fit(np.zeros(10), effects, values, np.ones(4), 1.0))
+    rest = search_loop.beside_cuts(search_loop.Fit(np.zeros(10), effects, values, np.ones(4), 1.0))
     assert rest.effects == (effects[0], effects[2])
     assert rest.values.tolist() == [0.5, 0.6, *sizes[0] * [0], *sizes[2] * [2]]
 
@@ -148,10 +148,10 @@ def test_what_is_beside_a_cut_is_looked_for_without_its_samples(
 
 def test_a_search_without_cuts_knows_no_kind_of_them() -> None:
     cut = catalogue()["torque_saturation"]((1,), {"level": 3.0})
-    blind = tracing._without_kinds(DiagnosisSpec(exclude=["backlash"]), [cut])
+    blind = search_loop._without_kinds(DiagnosisSpec(exclude=["backlash"]), [cut])
     assert (blind.exclude, blind.rounds) == (["backlash", "torque_saturation"], 60)
     alone = DiagnosisSpec(kinds=["torque_saturation"])
-    assert tracing._without_kinds(alone, [cut]).rounds == 0
+    assert search_loop._without_kinds(alone, [cut]).rounds == 0
 
 
 def test_a_pass_that_is_cut_short_keeps_what_the_pass_before_it_found() -> None:
@@ -162,4 +162,4 @@ def test_a_pass_that_is_cut_short_keeps_what_the_pass_before_it_found() -> None:
     model: Any = SimpleNamespace(is_weighed=False, states={})
     for found, named in ((), [1]), ((0, 1), [0, 1]):
         judge = Judgement(plain, plain, candidates, Rules(0.01, 0.01), anything, found)
-        assert sorted(tracing._searched(judge, 60, data, model, lambda: True)) == named
+        assert sorted(search_loop._searched(judge, 60, data, model, lambda: True)) == named

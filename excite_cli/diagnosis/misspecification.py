@@ -28,7 +28,7 @@ from scipy.stats import chi2
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.records import Approximation, LargeRest
 from excite_cli.diagnosis.schur import SHARED
-from excite_cli.diagnosis.tracing import Traced
+from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.diagnosis.training import Columns, Shown
 from excite_cli.effects.base import Effect, Tier
 
@@ -44,7 +44,7 @@ from excite_cli.effects.base import Effect, Tier
 _SURE = 1e-3  # chance that a curve as good as the effect leaves so much more, or less
 
 
-def curves_in_place(traced: Traced, joint_names: Sequence[str]) -> dict[int, Covariate]:
+def curves_in_place(traced: SearchResult, joint_names: Sequence[str]) -> dict[int, Covariate]:
     """Chosen candidates in whose place a curve without a name does, and of what it is one."""
     found: dict[int, Covariate] = {}
     for i in traced.chosen:
@@ -64,7 +64,7 @@ def curves_in_place(traced: Traced, joint_names: Sequence[str]) -> dict[int, Cov
     return found
 
 
-def functions_alike(traced: Traced, i: int) -> list[int]:
+def functions_alike(traced: SearchResult, i: int) -> list[int]:
     """Chosen candidates of the same joints that are functions of the same quantity, i with them."""
     own = traced.candidates[i]
     return [
@@ -75,7 +75,7 @@ def functions_alike(traced: Traced, i: int) -> list[int]:
     ]
 
 
-def _does_as_well(traced: Traced, like: Sequence[int], curve: Shown) -> bool:
+def _does_as_well(traced: SearchResult, like: Sequence[int], curve: Shown) -> bool:
     pool: list[Columns] = [*(traced.candidates[i] for i in traced.chosen), curve]
     white = traced.data.evidence(pool, traced.noise)
     every = range(len(traced.chosen))
@@ -101,7 +101,7 @@ _TRIED = 12  # of the strongest candidates of a joint
 
 
 def approximations(
-    traced: Traced,
+    traced: SearchResult,
     joint_names: Sequence[str],
     rests: Sequence[LargeRest],
 ) -> dict[int, Approximation]:
@@ -117,7 +117,7 @@ def approximations(
             found |= dict.fromkeys(functions_alike(traced, i), doubt)
     impossible = cache(partial(_impossible, traced))
     for i in (each for each in traced.chosen if each not in found):
-        if traced.judge.told_by_weight(i, traced.judge.without(i, traced.chosen)):
+        if traced.judge.identified_by_prior_only(i, traced.judge.without(i, traced.chosen)):
             continue  # inertias could explain it all: how much it explains says nothing
         joint, energy = _strongest(traced, i)
         name = joint_names[joint]
@@ -135,7 +135,7 @@ def approximations(
 
 
 def _is_outdone(
-    traced: Traced, i: int, rest: LargeRest, explained: float, joint_names: Sequence[str]
+    traced: SearchResult, i: int, rest: LargeRest, explained: float, joint_names: Sequence[str]
 ) -> bool:
     """Whether what is left says more than candidate i, whose E is given in units of the rest."""
     same = _same_quantity(traced, i, rest.depends_on, joint_names)
@@ -147,7 +147,7 @@ def _is_outdone(
     return _surely_left(rest) > limit * explained
 
 
-def _weaker_than_its_runs(traced: Traced, i: int, joint: int, explained: float) -> bool:
+def _weaker_than_its_runs(traced: SearchResult, i: int, joint: int, explained: float) -> bool:
     """Whether a change explains less than what is left in its runs, noise included.
 
     Noise that differs from run to run, as a load makes it, is judged by one deviation.
@@ -164,7 +164,7 @@ def _weaker_than_its_runs(traced: Traced, i: int, joint: int, explained: float) 
     return bool(left[sorted(folds)].sum() > explained)
 
 
-def _may_not_repeat(traced: Traced, i: int) -> bool:
+def _may_not_repeat(traced: SearchResult, i: int) -> bool:
     """Whether it is on one joint, and its form is a curve's as far as one sees."""
     effect = traced.candidates[i].effect
     if effect.holds_until_beaten or len(effect.joints) != 1:
@@ -173,7 +173,7 @@ def _may_not_repeat(traced: Traced, i: int) -> bool:
 
 
 def _means_of_curves(
-    traced: Traced, found: Mapping[int, Approximation]
+    traced: SearchResult, found: Mapping[int, Approximation]
 ) -> dict[int, Approximation]:
     """What is the mean of an approximation: a constant, or the friction that it varies.
 
@@ -198,7 +198,7 @@ def _means_of_curves(
     return means
 
 
-def _of_its_own(traced: Traced, i: int, rest: LargeRest) -> bool:
+def _of_its_own(traced: SearchResult, i: int, rest: LargeRest) -> bool:
     """Whether E says how much candidate i explains: the rest of the model takes little of it up.
 
     What inertias nearly take up has next to no E, however large it is.
@@ -209,7 +209,7 @@ def _of_its_own(traced: Traced, i: int, rest: LargeRest) -> bool:
     return not _taken_up(traced, i)
 
 
-def _taken_up(traced: Traced, i: int) -> bool:
+def _taken_up(traced: SearchResult, i: int) -> bool:
     """Whether the rest of the model nearly takes candidate i up; not what lacks a name mostly."""
     effect, judge = traced.candidates[i].effect, traced.judge
     if effect.refines or effect.runs or _is_constant(effect):
@@ -218,7 +218,7 @@ def _taken_up(traced: Traced, i: int) -> bool:
     return bool(judge.white.schur(others).gain(i, absorbed=SHARED).left <= _OF_ITS_OWN)
 
 
-def _limit_of_mean(traced: Traced, i: int, rest: LargeRest) -> float | None:
+def _limit_of_mean(traced: SearchResult, i: int, rest: LargeRest) -> float | None:
     """U/E from which it is the mean of something; None if it would not be that of any function."""
     effect = traced.candidates[i].effect
     if effect.is_change or "time" in effect.function_of:
@@ -239,7 +239,7 @@ def _surely_left(rest: LargeRest) -> float:
     return max(1.0 - (rest.noise / rest.rms) ** 2, rest.predictable)
 
 
-def _strongest(traced: Traced, i: int) -> tuple[int, float]:
+def _strongest(traced: SearchResult, i: int) -> tuple[int, float]:
     """The joint where candidate i explains most, in units of the noise, and that energy."""
     rest = traced.judge.without(i, traced.chosen)
     energies = {j: explained(traced, i, rest, [j]) for j in traced.candidates[i].rows}
@@ -247,14 +247,14 @@ def _strongest(traced: Traced, i: int) -> tuple[int, float]:
     return joint, max(energies[joint], 1e-300)
 
 
-def explained(traced: Traced, i: int, rest: Sequence[int], joints: Sequence[int]) -> float:
+def explained(traced: SearchResult, i: int, rest: Sequence[int], joints: Sequence[int]) -> float:
     """Energy on some joints that candidate i takes off beside the rest, in units of the noise."""
     plain = traced.judge.plain
     return plain.energy_on(rest, joints) - plain.energy_on([*rest, i], joints)
 
 
 def _same_quantity(
-    traced: Traced, i: int, depends_on: Sequence[Covariate], joint_names: Sequence[str]
+    traced: SearchResult, i: int, depends_on: Sequence[Covariate], joint_names: Sequence[str]
 ) -> bool:
     effect = traced.candidates[i].effect
     # Time belongs to no joint, and a column of the log neither.
@@ -262,7 +262,7 @@ def _same_quantity(
     return any(each.like in effect.function_of and each.joint in own for each in depends_on)
 
 
-def _impossible(traced: Traced, joint: int, quantities: tuple[str, ...]) -> tuple[float, str]:
+def _impossible(traced: SearchResult, joint: int, quantities: tuple[str, ...]) -> tuple[float, str]:
     """The most that a candidate which cannot be so would explain, and its kind.
 
     Of those that depend on one of the `quantities`: what others explain is something else's.
