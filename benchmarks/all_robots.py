@@ -1,4 +1,4 @@
-"""Robots that nobody prepared, in four formats, through the user's own path without an edit.
+"""Third-party robots in four formats, by the commands of a user, without an edit.
 
 Per robot: `excite init`, `optimize`, `check`, `simulate` with an effect that the config does not
 declare, and `diagnose`. What came of it is kept as one JSON file per robot, so that a run can be

@@ -6,8 +6,8 @@ Five robots, each with inertias 10–30 % off its description and three effects 
 not declare. Campaigns begin at a fraction of the motions' pace, and one effect does not show there:
 a torque that saturates. Beside each campaign: as many motions, planned in one go, as its seconds
 allow (`plain`), and random ones (`random`), at their own pace, diagnosed once. All models are then
-judged on two random motions that nobody has seen: what is missed of their torque where joints move.
-Every command is one that a user types. One file per robot, so that a run can be gone on with.
+judged on two held-out random motions: the error of their torque where joints move.
+Every command is one that a user types. One file per robot, so that a run can be resumed.
 """
 
 import argparse
@@ -243,7 +243,7 @@ def right(record: Record, named: list[list[Any]]) -> tuple[int, int]:
 def table(records: list[Record]) -> str:
     """Markdown: a row per robot and way."""
     lines = [
-        "| robot | way | motions | seconds | effects named | wrong names | missed, unseen |",
+        "| robot | way | motions | seconds | effects named | wrong names | held-out error |",
         "|---|---|---:|---:|---|---:|---:|",
     ]
     for record in records:
@@ -259,7 +259,7 @@ def table(records: list[Record]) -> str:
 def rounds(records: list[Record]) -> str:
     """Markdown: a row per round."""
     lines = [
-        "| robot | round | pace | seconds | missed before | after | effects found so far |",
+        "| robot | round | pace | seconds | error before | error after | effects found |",
         "|---|---:|---:|---:|---:|---:|---|",
     ]
     for record in records:
@@ -302,23 +302,29 @@ def main() -> None:
 _OPENING = """\
 # Campaigns on simulated robots
 
-Made by `make loops` (two hours). MuJoCo robots with inertias 10 to 30 % off their
-descriptions, 1 % of noise on the torques, and two or three effects that no config declares. One of
-them, a torque that saturates, shows only above the torques of the first round, which is played at
-40 % of the motions' pace. `excite campaign CONFIG --measure simulate` runs without anybody's help
-until it ends by itself. Beside it stand as many seconds of motions that are planned in one go
-(`plain`) and of random admissible ones (`random`: the best of four times as many), at their own
-pace from the beginning, which nobody should try on a robot that nobody knows, diagnosed once.
-*Missed, unseen* is what each model misses of the torque of two random motions that took no part,
-where joints move, mean over the joints; noise alone is about 0.2 %, and of the wrench of the
-standing robot, slow beside the 2 N and 0.5 N·m of noise of its feet, 1 to 8 % of a row.
+`make loops` makes this page (two hours). The robots are simulated in MuJoCo with inertias 10 to
+30 % off their descriptions, 1 % of noise on the torques, and two or three effects that no config
+declares. One of the effects is a torque saturation. It acts only above the torques of the first
+round, which is played at 40 % of the motions' pace.
 
-Of the standing robot, whose motions take minutes to plan, as many motions stand beside the
-campaign, in fewer seconds.
+- `campaign`: `excite campaign CONFIG --measure simulate`, unattended until it ends by itself.
+- `plain`: motions planned in one run, for the same motion time, at full pace, diagnosed once.
+- `random`: random admissible motions, the best of four times as many, otherwise as `plain`.
 
-In as many seconds motions at full pace find the same effects, and predict as well or better: most
-of a campaign's seconds are slow ones. What a campaign adds is that nothing is played faster than
-what is known allows, that it notices what only later motions show, and that it says when to stop.
+Full pace from the beginning is unsafe on an unknown robot.
+
+*Held-out error* is the error of the predicted torque on two random motions that no model was
+fitted to, where joints move, mean over the joints. Noise alone gives about 0.2 %. For the wrench
+of the standing robot it gives 1 to 8 % of a row, since its motions are slow beside the 2 N and
+0.5 N·m of noise of its feet.
+
+Motions of the standing robot take minutes to plan. There `plain` and `random` have the same number
+of motions as the campaign, in fewer seconds.
+
+For the same motion time, motions at full pace give the same effects and equal or smaller errors,
+since most of a campaign's time is at low pace. A campaign has three other advantages. It plays no
+motion faster than the present knowledge allows, it detects effects that only later motions show,
+and it reports when to stop.
 """
 
 if __name__ == "__main__":

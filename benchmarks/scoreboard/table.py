@@ -21,6 +21,8 @@ from benchmarks.scoreboard.record import Entry
 PART = MarkedPart("scoreboard", "benchmarks.scoreboard")
 TOOLS = (EXCITE, BODIES, FIGAROH, TOLD, SYSID, WLS, URDF)
 _SHORT = (EXCITE, FIGAROH, SYSID, WLS, URDF)
+# Names in the tables, where the record has another.
+_SHOWN = {BODIES: "excite, physically consistent", TOLD: "FIGAROH, coupling declared"}
 
 
 def short_table(entries: Sequence[Entry]) -> str:
@@ -40,7 +42,8 @@ def _with_told(entry: Entry) -> list[str]:
     """A row of a real log; beside FIGAROH's error that with what its authors know of the robot."""
     cells = row(entry.words, [mean(entry.of(tool)) for tool in _SHORT])
     if entry.of(TOLD) is not None:
-        cells[1 + _SHORT.index(FIGAROH)] += f" ({percent(mean(entry.of(TOLD)))} with coupling told)"
+        error = percent(mean(entry.of(TOLD)))
+        cells[1 + _SHORT.index(FIGAROH)] += f" ({error} with coupling declared)"
     return cells
 
 
@@ -64,7 +67,8 @@ def by_joint(entry: Entry) -> str:
     """Of one log: all tools, joint by joint, and what each costs."""
     some = next(each.verdict for each in entry.results if each.verdict is not None)
     joints = list(some.by_joint)
-    heads = ["", "mean", *joints, "as recorded", "links can be", "processor [s]", "lines", "of"]
+    costs = ["CPU time [s]", "lines", "date"]
+    heads = ["", "mean", *joints, "as recorded", "links consistent", *costs]
     rows = []
     for tool in TOOLS:
         result = entry.of(tool)
@@ -72,11 +76,12 @@ def by_joint(entry: Entry) -> str:
             continue
         cost = [f"{result.processor:.0f}", str(result.lines), entry.dates.get(tool, "")]
         if result.verdict is None:
-            rows.append([tool, f"none: {result.told}", *[""] * (len(joints) + 2), *cost])
+            rows.append([shown(tool), f"none: {result.told}", *[""] * (len(joints) + 2), *cost])
             continue
         errors = [percent(result.verdict.by_joint[j]) for j in joints]
-        rows.append([tool, percent(result.verdict.mean), *errors, percent(result.verdict.raw),
-                     possible(result), *cost])  # fmt: skip
+        whole = percent(result.verdict.mean)
+        raw = percent(result.verdict.raw)
+        rows.append([shown(tool), whole, *errors, raw, possible(result), *cost])
     return table(heads, rows)
 
 
@@ -87,10 +92,10 @@ def simulated(entries: Sequence[Entry]) -> str:
     firsts = [sum(_is_first(each, tool) for each in entries) for tool in tools]
     rows.append([f"first of {len(entries)}", *map(str, firsts)])
     consistent = [_count(entries, tool, lambda r: possible(r) == "yes") for tool in tools]
-    rows.append(["links can be", *consistent])
+    rows.append(["links consistent", *consistent])
     seconds = [_median([each.of(tool) for each in entries]) for tool in tools]
-    rows.append(["processor [s], median", *seconds])
-    return table(["simulated robot, planted effect", *tools], rows)
+    rows.append(["CPU time [s], median", *seconds])
+    return table(["simulated robot, planted effect", *map(shown, tools)], rows)
 
 
 def names(entries: Sequence[Entry]) -> str:
@@ -99,10 +104,15 @@ def names(entries: Sequence[Entry]) -> str:
     total = {key: sum(each.get(key, 0) for each in told) for key in ("wrong", "told", "planted")}
     robots = sum(each.get("wrong", 0) > 0 for each in told)
     return (
-        f"Names that excite gave: {total['told']} of {total['planted']} planted effects (friction "
-        f"of every joint, and one more each) are told; {total['wrong']} wrong names, on {robots} "
-        f"of {len(told)} robots. The other tools have a fixed model and name nothing."
+        f"excite names {total['told']} of {total['planted']} planted effects (friction of every "
+        f"joint, and one more per robot). Wrong names: {total['wrong']}, on {robots} of "
+        f"{len(told)} robots. The other tools have a fixed model and name nothing."
     )
+
+
+def shown(tool: str) -> str:
+    """The tool's name in tables."""
+    return _SHOWN.get(tool, tool)
 
 
 def mean(result: Result | None) -> float:
@@ -111,7 +121,7 @@ def mean(result: Result | None) -> float:
 
 
 def possible(result: Result) -> str:
-    """Whether its links can be; a tool of base parameters has no links to speak of."""
+    """Whether its links are physically consistent; base parameters alone have no links."""
     known = None if result.verdict is None else result.verdict.possible
     return {True: "yes", False: "no", None: "–"}[known]
 

@@ -16,7 +16,7 @@ effect of an impossible sign or size would explain. The effect is an approximati
 Rests say nothing of effects that inertias nearly take up, of which E is next to nothing, but by
 their own quantity. A change in some runs or over time, first-order friction and, where a good part
 can be predicted, a constant are means of a function of anything: U > 0.25 E is enough for changes,
-U > 0.3 E for friction and U > 0.5 E for constants (docs/decisions.md).
+U > 0.3 E for friction and U > 0.5 E for constants (docs/decisions/names-beside-large-residuals.md).
 """
 
 from collections.abc import Mapping, Sequence

@@ -28,8 +28,8 @@ from excite_cli.robot.model import Robot
 
 Fitted = Callable[[Processing], Fit]
 
-# Simulated arms (docs/decisions.md): at most 2.9 behind filters that cover as the automatic one
-# does, at least 3.2 behind those that do not.
+# Simulated arms: at most 2.9 behind filters that cover as the automatic one does, at least 3.2
+# behind those that do not.
 _DIFFERENT = 3.0
 # Deviations behind a better filter than the automatic one: 0.3 to 0.82 of those behind that one.
 _LESS_CERTAIN = 0.9

@@ -27,7 +27,7 @@ _MASS_SHARE, _MOMENT_FLOOR, _INERTIA_FLOOR = 0.1, 0.2, 0.1
 _MEDIAN = 0.6745  # of |z|, z normal
 _AS_USUAL, _WIDENINGS = 1.05, 8
 # Standard deviation of the URDF's inertial parameters, as a share, where nobody says it: over real
-# and simulated robots 0.3 is best or next to it (docs/decisions.md).
+# and simulated robots 0.3 is best or next to it (docs/decisions/prior-of-inertial-parameters.md).
 _UNSURE, _UNKNOWN = 0.3, 1.0
 
 

@@ -138,7 +138,7 @@ RECORDS = [
 def test_the_page_counts_and_tells() -> None:
     there = [(source, json.loads(json.dumps(record))) for source, record in RECORDS]
     text = page(there, [*(source for source, _ in there), Source("c", "URDF", ("--robot", "c"))], 7)
-    assert "Run were 2 of the 2 robots of these packages and 0 of the 1 of example" in text
+    assert "2 of the 2 robots of these packages and 0 of the 1 of example" in text
     assert "| URDF | 1 | 1 | 1 | 1 | 0 | 0 |" in text
     assert "| SDF | 1 | 0 | 0 | 0 | 0 | 0 |" in text
     assert "| all | 2 | 1 | 1 | 1 | 0 | 0 |" in text

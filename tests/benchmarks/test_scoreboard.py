@@ -170,7 +170,7 @@ def test_what_a_tool_was_told_by_hand_stands_beside_what_it_does_alone() -> None
     told = short_table(
         [entry("x", True, result(EXCITE, 0.1), result(FIGAROH, 0.4), result(TOLD, 0.2))]
     )
-    assert "| 40 % (20 % with coupling told) |" in told
+    assert "| 40 % (20 % with coupling declared) |" in told
 
 
 def test_simulated_robots_are_one_row_of_medians_over_those_that_all_answered() -> None:
@@ -198,7 +198,7 @@ def test_firsts_and_names_are_counted() -> None:
     first = next(line for line in simulated(entries).splitlines() if "first of" in line)
     assert first == "| first of 2 | 1 | 0 | 0 | 0 | 1 | 0 |"
     assert "15 of 16 planted effects" in names(entries)
-    assert "1 wrong names, on 1 of 2 robots" in names(entries)
+    assert "Wrong names: 1, on 1 of 2 robots" in names(entries)
 
 
 def test_a_tool_that_is_not_run_keeps_its_last_result_and_date(tmp_path: Path) -> None:
