@@ -200,13 +200,28 @@ _trial = _Trial()
 atexit.register(_trial.close)
 
 
-def _peak() -> int:
+def _peak_memory() -> Callable[[], int]:
+    """What says the most memory that this process has had [bytes]; to be made before `confine`.
+
+    The kernel's `ru_maxrss` begins at that of the process that started this one: a script with a
+    large array could read no mesh.
+    """
     try:
         import resource
     except ImportError:
-        return 0
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak if sys.platform == "darwin" else 1024 * peak
+        return lambda: 0
+    try:
+        status = Path("/proc/self/status").open("rb", buffering=0)  # noqa: SIM115
+    except OSError:  # no Linux
+        unit = 1 if sys.platform == "darwin" else 1024
+        return lambda: unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+    def peak() -> int:
+        status.seek(0)
+        line = next(each for each in status.read(1 << 16).splitlines() if each[:6] == b"VmHWM:")
+        return 1024 * int(line.split()[1])
+
+    return peak
 
 
 def serve() -> None:
@@ -217,6 +232,7 @@ def serve() -> None:
     from excite_cli.robot.gltf_scenes import load_whole
 
     limit_memory(2 * _MAX_MEMORY)
+    peak = _peak_memory()
     copies, *folders = map(Path, json.loads(sys.stdin.buffer.readline()))
     confine(folders, [copies])
     idle = threading.Timer(_IDLE, os._exit, (0,))
@@ -226,10 +242,10 @@ def serve() -> None:
         idle.cancel()
         path, seconds, large = json.loads(line)
         set_alarm(seconds)
-        answer = _read(load_whole, Path(path), copies, large)
+        answer = _read(load_whole, Path(path), copies, large, peak)
         set_alarm(0)
         print(json.dumps(answer), flush=True)
-        if _peak() > _MAX_MEMORY:
+        if peak() > _MAX_MEMORY:
             return  # the next begins with a peak of its own
         idle = threading.Timer(_IDLE, os._exit, (0,))
         idle.daemon = True
@@ -237,7 +253,11 @@ def serve() -> None:
 
 
 def _read(
-    load: Callable[[Path, Path], Any], path: Path, copies: Path, large: bool
+    load: Callable[[Path, Path], Any],
+    path: Path,
+    copies: Path,
+    large: bool,
+    peak: Callable[[], int],
 ) -> tuple[str, str]:
     """What is wrong with a mesh, or nothing and its copy."""
     import numpy as np
@@ -249,7 +269,7 @@ def _read(
         return (said.strip().splitlines() or ["no reason given"])[0].rstrip(".")[:200], ""
     if not mesh.num_vertices or not mesh.num_tris:
         return "it has no triangles", ""
-    if (mesh.num_tris > MAX_TRIANGLES and not large) or _peak() > _MAX_MEMORY:
+    if (mesh.num_tris > MAX_TRIANGLES and not large) or peak() > _MAX_MEMORY:
         return f"it is too large ({mesh.num_tris:,} triangles)", ""
     points = np.asarray(mesh.vertices(), dtype=float).reshape(-1, 3)
     if not np.isfinite(points).all():

@@ -1,6 +1,8 @@
 """URDFs and meshes made to read other files, to fill memory, to take for ever or to crash."""
 
 import struct
+import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -212,3 +214,23 @@ def test_what_is_loaded_already_does_not_count_to_the_memory_of_meshes(tmp_path:
     line = next(line for line in limits.splitlines() if line.startswith("Max address space"))
     assert int(line.split()[3]) > 2 * mesh_trial._MAX_MEMORY + 2**26
     assert b"OPENBLAS_NUM_THREADS=1\0" in Path(f"/proc/{process.pid}/environ").read_bytes()
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="Linux tells the peak so")
+def test_a_script_with_a_large_array_can_read_meshes(tmp_path: Path) -> None:
+    """A process begins with the peak memory of the one that started it, by one of two counts."""
+    (tmp_path / "palm.stl").write_bytes(b"room" + binary_stl()[4:])
+    script = (
+        "import sys\n"
+        "from pathlib import Path\n"
+        "from excite_cli.robot import mesh_trial\n"
+        "full = bytearray(mesh_trial._MAX_MEMORY + 2**26)\n"
+        "full[::4096] = bytes([1]) * len(full[::4096])\n"
+        "del full\n"
+        "folder = Path(sys.argv[1])\n"
+        "print(mesh_trial.faults([folder / 'palm.stl'], [folder]))\n"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", script, str(tmp_path)], capture_output=True, text=True, check=True
+    )
+    assert run.stdout.strip() == "{}"
