@@ -33,6 +33,7 @@ from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
 from excite_cli.diagnosis.search import Search
 from excite_cli.diagnosis.textbook import everyday, textbook_effects
 from excite_cli.diagnosis.training import TrainingData
+from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.diagnosis.weighted_fit import WeightedFit
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.effects.base import Effect, Signals
@@ -398,27 +399,28 @@ def _searched(
         chosen = search.run(search.pruned(everyday(judge.candidates)) if most else ())
         if over():  # a pass that was cut short may know less than the one before it
             chosen = min(chosen, search.pruned(list(judge.found)), key=judge.cost)
-        return _in_both(judge.candidates, chosen, open_)
+        return _in_both(judge, chosen, open_)
     chosen = search.run()
     places = {effect.place for effect in scales(model.robot)}
     gains = [i for i, c in enumerate(judge.candidates) if c.place in places]
-    return _in_both(judge.candidates, min(chosen, search.run(gains), key=judge.cost), open_)
+    return _in_both(judge, min(chosen, search.run(gains), key=judge.cost), open_)
 
 
-def _in_both(
-    candidates: Sequence[Candidate], chosen: Sequence[int], open_: Collection[int]
-) -> list[int]:
-    """The same effects, those by which two recordings differ with one value for both.
+def _in_both(judge: Judgement, chosen: Sequence[int], open_: Collection[int]) -> list[int]:
+    """The same effects, those by which two recordings differ with one value for both, if it holds.
 
     Looked for without them, a joint whose offset had changed was given waves and gains for it.
     """
+    candidates = judge.candidates
     places = {candidates[i].place for i in chosen}
     found = [i for i in chosen if i not in open_]
     for i in chosen:
-        place = candidates[i].place._replace(runs=())
-        if i in open_ and place not in places:
-            found += [k for k, c in enumerate(candidates) if c.place == place][:1]
-            places.add(place)
+        common = candidates[i].place._replace(runs=())
+        if i in open_ and common not in places:
+            places.add(common)
+            own = next((k for k, c in enumerate(candidates) if c.place == common), None)
+            if own is not None and judge.verdict(found, [own]) is Verdict.ACCEPTED:
+                found.append(own)
     return found
 
 
