@@ -1,0 +1,57 @@
+"""Pseudo-inertias and lengths of bodies, against values by hand."""
+
+import numpy as np
+import pytest
+
+from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.dynamics.pseudo_inertia import body_lengths, smallest_eigenvalues
+from excite_cli.robot.model import Array, Robot, build_robot
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return build_robot(RobotSpec(urdf="example-robot-data:ur5"))
+
+
+def body(mass: float, center: float = 0.0, gyration: float = 0.0) -> list[float]:
+    """A ball of that radius of gyration [m] about each axis, its centre on x."""
+    inertia = mass * gyration**2
+    offset = mass * center**2
+    return [mass, mass * center, 0, 0, inertia, 0, inertia + offset, 0, 0, inertia + offset]
+
+
+def half_reach(robot: Robot) -> Array:
+    """Of the bodies of an open chain: half the distance to the next joint; none of the last."""
+    placements = robot.model.jointPlacements
+    found = [np.linalg.norm(placements[k].translation) / 2 for k in range(2, robot.model.njoints)]
+    return np.array([*found, 0.0])
+
+
+def test_a_length_is_the_largest_of_gyration_lever_and_half_reach(robot: Robot) -> None:
+    count = robot.model.njoints - 1
+    far, wide, plain = body(2.0, center=3.0), body(2.0, gyration=4.0), body(2.0, gyration=1e-6)
+    lengths = body_lengths(robot, np.array([far, wide, *[plain] * (count - 2)]).ravel())
+    # Of a point mass 3 m away: the square of its radius of gyration is half of 9 + 9.
+    assert lengths[0] == pytest.approx(3.0)
+    # Half the trace of 3 · 16 m is 24 m.
+    assert lengths[1] == pytest.approx(np.sqrt(1.5) * 4.0)
+    assert lengths[2:-1] == pytest.approx(half_reach(robot)[2:-1], rel=1e-6)
+    assert lengths[-1] == 0.02  # the least of all
+
+
+def test_of_a_body_without_mass_only_its_reach_counts(robot: Robot) -> None:
+    """Its first moments, divided by next to nothing, would be kilometres."""
+    count = robot.model.njoints - 1
+    nothing = [1e-9, 1e-6, 0, 0, 1e-6, 0, 1e-6, 0, 0, 1e-6]
+    lengths = body_lengths(robot, np.array([nothing] * count).ravel())
+    reach = half_reach(robot)
+    assert lengths[:-1] == pytest.approx(reach[:-1])
+    assert lengths[-1] == pytest.approx(np.median(reach[reach > 0]))
+
+
+def test_the_least_eigenvalue_says_whether_it_is_a_body(robot: Robot) -> None:
+    ball = np.array(body(2.0, gyration=0.5))
+    assert smallest_eigenvalues(ball, np.ones(1)) == pytest.approx([2.0 * 0.125])
+    flat = ball.copy()
+    flat[9] = 3 * ball[4]  # more about one axis than about the two others together
+    assert smallest_eigenvalues(flat, np.ones(1))[0] < 0.0
