@@ -9,7 +9,7 @@ import pytest
 from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.diagnosis.weighted_fit import WeightedFit
-from excite_cli.identification.least_squares import fit_rows
+from excite_cli.identification.least_squares import EXACT, fit_rows
 from excite_cli.robot.model import Array
 from tests.diagnosis.explicit_data import FIXED, PRIOR, random_candidates, random_data
 
@@ -24,6 +24,26 @@ def test_it_is_the_fit_of_identify(chosen: tuple[int, ...], seed: int) -> None:
     found = WeightedFit(data, candidates)(chosen)[0]
     rows = data.rows(candidates, chosen)
     assert found == pytest.approx(fit_rows(rows, "wls").x, rel=1e-9, abs=1e-12)
+
+
+def test_sigma_is_what_is_left_for_each_degree_of_freedom() -> None:
+    """σ_j² = Σ r² / (N_j (1 − k / N)): every joint pays its share of the k parameters."""
+    data, candidates, chosen = random_data(6), random_candidates(6), [0, 1, 3]
+    parameters, sigma = WeightedFit(data, candidates)(chosen)
+    squares, counts = np.zeros(2), np.zeros(2)
+    for left, run in zip(data.residuals(candidates, chosen, parameters), data.runs, strict=True):
+        squares += np.where(run.usable, left**2, 0.0).sum(axis=0)
+        counts += run.usable.sum(axis=0)
+    expected = np.sqrt(squares / counts / (1.0 - len(parameters) / counts.sum()))
+    assert sigma == pytest.approx(expected, rel=1e-3)
+
+
+def test_of_data_without_noise_sigma_is_the_rounding_of_the_torque() -> None:
+    data, candidates = random_data(7), random_candidates(7)
+    data = _with(data, tuple(own @ np.array([1e3, 2e3, -1e3, 5e2]) for own in data.declared))
+    sigma = WeightedFit(data, candidates)([])[1]
+    level = np.sqrt(np.mean(np.concatenate(data.tau) ** 2, axis=0))
+    assert sigma == pytest.approx(EXACT * level, rel=0.2)
 
 
 def test_a_prior_holds_what_it_knows() -> None:
