@@ -5,6 +5,7 @@ truth: the residual of the diagnosed model on training data against the noise th
 through the filters of that diagnosis.
 """
 
+import re
 import tempfile
 import time
 import traceback
@@ -166,7 +167,15 @@ def answer_of(found: Diagnosis) -> Answer:
         tuple(_named(each, refined) for each in found.effects),
         tuple(Name(each.kind, each.joints) for each in found.absorbed),
         frozenset(_left(found)),
+        _differences(found),
     )
+
+
+def _differences(found: Diagnosis) -> frozenset[Name]:
+    """By what two training recordings are said to differ: `<kind> of <joints> by <size>`."""
+    text = " ".join(each.text for each in found.findings if each.kind == "runs_differ")
+    parts = re.findall(r"(\w+) of (\w+(?: and \w+)*) by [+-]", text)
+    return frozenset(Name(kind, tuple(joints.split(" and "))) for kind, joints in parts)
 
 
 def _named(each: NamedEffect, refined: set[tuple[str, tuple[str, ...]]]) -> Named:

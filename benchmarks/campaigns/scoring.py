@@ -49,11 +49,15 @@ class Named:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a diagnosis says; `said`: joints of whose rest it says that it is unexplained."""
+    """What a diagnosis says; `said`: joints of whose rest it says that it is unexplained.
+
+    `differences`: by what two recordings are said to differ, which no model then has.
+    """
 
     named: tuple[Named, ...]
     absorbed: tuple[Name, ...] = ()
     said: frozenset[str] = frozenset()
+    differences: frozenset[Name] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -127,6 +131,8 @@ def _found(plant: Plant, truth: Truth, answer: Answer) -> bool:
     if any(_kind_and_place(plant, name, truth) for name in answer.absorbed):
         return True
     own = Name(plant.kinds[0], plant.joints)
+    if plant.runs and own in answer.differences:
+        return True
     parts = () if plant.runs or plant.by_run else identity(own, bool(truth.declared))
     return bool(parts) and all(any(p == n.called.name for n in names) for p in parts)
 

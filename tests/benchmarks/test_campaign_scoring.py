@@ -1,10 +1,13 @@
 """What counts as right of a campaign: kind, place and runs, on answers made up by hand."""
 
 from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from benchmarks.battery.scoring import Name
+from benchmarks.campaigns.judge import _differences
 from benchmarks.campaigns.plants import Plant
 from benchmarks.campaigns.scoring import Answer, Called, Named, Score, Truth, score
 
@@ -143,3 +146,16 @@ def test_what_follows_a_column_is_named_with_it(
     aliases = (Called(name, covariate=other),) if other else ()
     result = judged(there, Named(Called(name, covariate=column), aliases))
     assert (result.right, result.wrong) == (right, wrong)
+
+
+def test_by_what_two_recordings_are_said_to_differ_is_found() -> None:
+    """No model has it: which of two recordings is usual is not known."""
+    text = "r1 and r2 differ: torque_offset of j1 by -0.05 N·m in r2; friction of j2 and j3 by +1"
+    said: Any = SimpleNamespace(findings=[SimpleNamespace(kind="runs_differ", text=text)])
+    differences = _differences(said)
+    assert differences == {Name("torque_offset", ("j1",)), Name("friction", ("j2", "j3"))}
+    truth = Truth((plant("torque_offset", "j1", runs="b"),), frozenset("ab"), JOINTS, "j3")
+    assert score(truth, Answer((), differences=differences)).right
+    assert not score(truth, Answer((), differences=frozenset({Name("torque_gain", ("j1",))}))).right
+    steady = Truth((plant("torque_offset", "j1"),), frozenset("ab"), JOINTS, "j3")
+    assert not score(steady, Answer((), differences=differences)).right
