@@ -23,7 +23,7 @@ from excite_cli.robot.model import Array, Robot
 #
 # Recordings show a part of what a robot can do. Where a joint crept, nothing is known of what it
 # does at speed, however well every second of the recording is predicted. So sizes are judged along
-# this motion as well (`reach`, `elsewhere`).
+# this motion as well (`sufficient`).
 
 _SECONDS, _STEP, _PERIOD = 20.0, 0.02, 10.0  # s
 _HARMONICS = 5

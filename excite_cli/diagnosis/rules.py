@@ -1,7 +1,7 @@
 """The rules of judgement beside the prices of the search: each a sentence, and what asks for it.
 
 What a user sets is in the config (`diagnosis.significance`, `diagnosis.gain`), and what physics
-forbids with the effects. When a name is taken back as an approximation is told in `doubt`.
+forbids with the effects. When a name is taken back as an approximation is in `misspecification`.
 `python -m benchmarks.ablations` switches every rule here off in turn.
 """
 

@@ -1,4 +1,4 @@
-"""Why a pair of shapes is not checked: records, put into words by `geometry.words`."""
+"""Why a pair of shapes is not checked, as records and in words."""
 
 from dataclasses import dataclass
 from enum import StrEnum
