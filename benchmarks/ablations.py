@@ -27,6 +27,7 @@ OFF: dict[str, dict[str, float]] = {
     "PARENT_PRICE": {"PARENT_PRICE": 25.0},  # about its own price
     "ON_FEWER_ROWS": {"ON_FEWER_ROWS": 0.0},
     "FARTHER": {"FARTHER": NO},
+    "LEAST_SIDE": {"LEAST_SIDE": 0.0},
     "RUNS_OF_A_DRIFT": {"RUNS_OF_A_DRIFT": 1},
     "CONFIDENCE": {"CONFIDENCE": 0.5, "OF_ONE_RECORDING": 0.5},
     "OF_ONE_RECORDING": {"OF_ONE_RECORDING": rules.CONFIDENCE},

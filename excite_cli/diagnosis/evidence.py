@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.blocks import Blocks, keep
 from excite_cli.diagnosis.schur import (
     ABSORBED,
@@ -73,9 +74,6 @@ class Grams:
 
 
 _THERE = 1e-5  # of a column's energy: of less in a fold, it is not there
-# Of an effect's energy: with less on one side of the blocks, nothing of it is known from there. A
-# push of half a second is in one block of a second, or in two.
-_LEAST_SIDE = 0.1
 _BY_WEIGHT = 4.0  # times what the data leave: the deviation is half of theirs, or less
 _NEXT_TO_NOTHING = 1e-6  # of a prior's precision
 _KEPT = 6  # projections that are kept: a step of a search asks for the same few again
@@ -276,7 +274,7 @@ class Evidence:
         """Whether one of the two sides, blocks of a second in turn, has nearly all of them."""
         sides = self._on_sides[:, np.concatenate([self.blocks[i] for i in candidates])].sum(axis=1)
         halves = sides[::2].sum(), sides[1::2].sum()
-        return bool(min(halves) < _LEAST_SIDE * sum(halves))
+        return bool(min(halves) < rules.LEAST_SIDE * sum(halves))
 
     @cached_property
     def _on_sides(self) -> Array:
