@@ -27,7 +27,7 @@ ON_FEWER_ROWS = 25.0
 # wave was given a linear function of its angle, too, and 27 times the error.
 FARTHER, MUCH = 3.0, 0.5
 
-# What has less than this share of its energy in the seconds that are fitted is unknown there, and is
+# What has less than this share of its energy in the seconds that are fitted is unknown there: it is
 # judged by what a fit to all explains. Of pushes of half a second in campaigns of a UR10 (seeds
 # 5962, 5963) three of three were missed without, since their second is left out as a whole.
 LEAST_SIDE = 0.1
