@@ -173,6 +173,16 @@ def test_late_speeds(steps: int) -> None:
     assert [found.kind for found in check(late)[1]] == (["lag"] if steps else [])
 
 
+@pytest.mark.parametrize("lag", [0.0117, -0.0121, 0.0963])
+def test_a_lag_is_known_to_a_part_of_a_sample(lag: float) -> None:
+    """Also near the longest that is looked for, 0.1 s."""
+    t = np.arange(2000) / 200
+    rates = np.array([1.1, 2.3, 3.7])
+    q, dq = np.sin(rates * t[:, None]), rates * np.cos(rates * (t[:, None] - lag))
+    late = Run("late", t, q, np.zeros_like(q), dq=dq)
+    assert speed_lag(late) == pytest.approx(lag, abs=0.05 / 200)
+
+
 # --- samples
 
 
