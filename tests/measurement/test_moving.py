@@ -20,7 +20,7 @@ def test_counts_of_a_coarse_encoder_add_up_to_a_way_and_those_of_a_flicker_do_no
 def test_steps_that_are_like_the_one_before_are_a_motion_and_noise_is_not() -> None:
     """Both as wide as a few of their steps: a slow wave, and noise."""
     k, rng = np.arange(400), np.random.default_rng(0)
-    wave = np.sin(2 * np.pi * k / 30)
+    wave = np.sin(2 * np.pi * k / 15)
     noise = rng.normal(size=len(k))
     still = np.zeros(len(k))
     assert moves(np.column_stack([wave, noise, still]), 150, 250).tolist() == [True, False, False]
