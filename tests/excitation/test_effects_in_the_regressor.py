@@ -86,6 +86,15 @@ def _error(objective: Objective, criterion: object, alpha: np.ndarray) -> float:
     )
 
 
+def test_effects_count_time_from_the_begin_of_the_motion() -> None:
+    """As recordings of it do, whatever instants the cost looks at."""
+    robot = random_robot(31, joints=3)
+    columns = EffectColumns(robot, _effects(robot, ["spring"], np.random.default_rng(2)))
+    state = np.zeros((5, robot.n))
+    signals = columns.signals(3.0 + np.arange(5.0), state, state, state)
+    assert signals.t.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+
+
 @pytest.mark.parametrize("kind", EXCITABLE)
 def test_every_kind_is_pulled_back_to_the_coefficients(kind: str) -> None:
     """Σ W ∘ columns for a random W: no criterion, no singular value, nothing that could hide."""
