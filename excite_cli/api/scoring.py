@@ -24,8 +24,9 @@ from excite_cli.store.score_file import write_score
 from excite_cli.store.thresholds_file import write_thresholds
 from excite_cli.summary.score import score_answer as score_answer
 from excite_cli.summary.score import thresholds_parts as thresholds_parts
-from excite_cli.workers.base import Here, News, Workers
+from excite_cli.workers.base import News, Workers
 from excite_cli.workers.base import Tell as WorkersTell
+from excite_cli.workers.here import Here
 
 
 @checked()

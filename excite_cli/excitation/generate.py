@@ -27,7 +27,8 @@ from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import Start, moved_note, start_from
 from excite_cli.excitation.task import MotionTask
 from excite_cli.trajectory.fade import Segment
-from excite_cli.workers.base import Here, News, Watch, Workers
+from excite_cli.workers.base import News, Watch, Workers
+from excite_cli.workers.here import Here
 
 # Beyond this condition number some parameters do not show at all.
 _BLIND = 1e9

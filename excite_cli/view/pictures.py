@@ -22,7 +22,8 @@ from excite_cli.view.rays import embree_part
 from excite_cli.view.scene import Scene, build_scene, outermost
 from excite_cli.view.studio import FINE, QUICK, Studio
 from excite_cli.view.translucent import CAPSULE, NEAREST, REGION
-from excite_cli.workers.base import Here, News, Workers
+from excite_cli.workers.base import News, Workers
+from excite_cli.workers.here import Here
 
 Told = Callable[[str, int], None]
 Said = Callable[[str], None]

@@ -3,7 +3,8 @@
 from collections.abc import Callable
 
 from excite_cli.errors import ConfigError
-from excite_cli.workers.base import Here, Workers
+from excite_cli.workers.base import Workers
+from excite_cli.workers.here import Here
 
 MOST_WORKERS = 256
 

@@ -23,7 +23,8 @@ from excite_cli.excitation.random_baseline import RandomBaseline, random_baselin
 from excite_cli.excitation.run import continue_run, new_result
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack
-from excite_cli.workers.base import Here, Workers
+from excite_cli.workers.base import Workers
+from excite_cli.workers.here import Here
 from excite_cli.workers.processes import Processes
 
 CONFIG = Path(__file__).parents[2] / "configs" / "smoke.yaml"
