@@ -9,7 +9,7 @@ from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.diagnosis.words import approximation_in_words, ends_in_words, rests_in_words
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.shown.answer import Command, Part, Table
-from excite_cli.summary.diagnosis import absorbed_parts, path_parts
+from excite_cli.summary.diagnosis import absorbed_parts
 from excite_cli.summary.error_by_joint import error_tables
 from excite_cli.summary.named_effects import approximation_parts, effect_parts, friction_table
 
@@ -131,7 +131,6 @@ def _after(first: Diagnosed) -> list[str]:
         as_markdown(_errors(found)),
         *_pictures(first, "errors", "Errors of every joint before and after"),
         *map(escaped, map(ends_in_words, found.parts)),
-        *map(as_markdown, path_parts(found, False)),
         *_pictures(first, "after_", "Measured torque, the model with what was found, the residual"),
     ]
 

@@ -48,7 +48,6 @@ def diagnose(
     output: str | Path | None = None,
     apply: str | Path | None = None,
     apply_unconfirmed: bool = False,
-    smallest: bool = False,
     overwrite: bool = False,
     workers: Workers | None = None,
     progress: Callable[[str, int], None] = lambda text, done: None,
@@ -60,10 +59,9 @@ def diagnose(
     `data` are measured data or their files. Written to `output` (HDF5) if that is given, and the
     config with what was found to `apply` (YAML); where the error on held-out data did not fall
     (`good` is false), that is written with `apply_unconfirmed` only, and where the textbook's model
-    is better (`worse_than_textbook`), that one is. `smallest`: with the fewest
-    effects that are within one standard error of the best on runs left out. `workers`
-    (`open_workers`) share the runs; every number is the same without. `ended` is asked between the
-    steps of the search: once it is true, or after `diagnosis.max_seconds`, the answer so far is it.
+    is better (`worse_than_textbook`), that one is. `workers` (`open_workers`) share the runs; every
+    number is the same without. `ended` is asked between the steps of the search: once it is true,
+    or after `diagnosis.max_seconds`, the answer so far is it.
 
     Returns
     -------
@@ -80,8 +78,6 @@ def diagnose(
     """
     if apply_unconfirmed and apply is None:
         raise ConfigError("--apply-unconfirmed says nothing without --apply NEW.yaml.")
-    if smallest and apply is None:
-        raise ConfigError("--smallest says nothing without --apply NEW.yaml.")
     problem = measured_case(problem)
     inputs = inputs_of(problem, *sources_of(data))
     with held({"output": output, "apply": apply}, overwrite, inputs), at_hand(workers):
@@ -99,7 +95,7 @@ def diagnose(
         if output is not None:
             write_diagnosis(Path(output), found)
         if apply is not None and (found.good or apply_unconfirmed):
-            save_config(apply, problem, found, unconfirmed=True, smallest=smallest)
+            save_config(apply, problem, found, unconfirmed=True)
         elif apply is not None and found.worse_than_textbook:
             path = Path(apply)
             text = found_config(problem.spec, problem.folder, found, path, textbook=True)
@@ -117,11 +113,8 @@ def save_config(
     found: Diagnosis,
     *,
     unconfirmed: bool = False,
-    smallest: bool = False,
 ) -> None:
     """Write the config with the effects that a diagnosis found: `excite diagnose --apply`.
-
-    `smallest`: with the fewest that are within one standard error of the best (`found.smallest`).
 
     Raises
     ------
@@ -133,5 +126,5 @@ def save_config(
     if not (found.good or unconfirmed):
         raise ConfigError(f"{path} is not written. {no_gain_in_words(found)} {_HAVE_IT}")
     refuse_inputs_as_outputs({"path": Path(path)}, inputs_of(problem))
-    text = found_config(problem.spec, problem.folder, found, Path(path), smallest)
+    text = found_config(problem.spec, problem.folder, found, Path(path))
     write_text_atomically(Path(path), text)

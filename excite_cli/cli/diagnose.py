@@ -39,14 +39,6 @@ def diagnose(
             rich_help_panel=OUTPUT,
         ),
     ] = False,
-    smallest: Annotated[
-        bool,
-        typer.Option(
-            "--smallest",
-            help="Let --apply write the fewest effects that are about as good as the best.",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = False,
     workers: options.Workers = 1,
     scheduler: options.Scheduler = None,
     overwrite: options.Overwrite = False,
@@ -89,7 +81,6 @@ def diagnose(
             output=output,
             apply=apply,
             apply_unconfirmed=apply_unconfirmed,
-            smallest=smallest,
             overwrite=overwrite,
             workers=place,
             progress=line,

@@ -19,18 +19,16 @@ from excite_cli.diagnosis.excess_residual import large_rests
 from excite_cli.diagnosis.final_fit import final_fit, regression, signal_to_error
 from excite_cli.diagnosis.held_out_errors import (
     INERTIAS,
-    HeldOutErrors,
     Played,
     both_models,
     error_parts,
-    error_path,
     held_out_errors,
     refitted,
 )
-from excite_cli.diagnosis.held_out_verdict import Worth, worth_on_held_out
+from excite_cli.diagnosis.held_out_verdict import worth_on_held_out
 from excite_cli.diagnosis.misspecification import approximations
 from excite_cli.diagnosis.modelled_run import Model, ModelledRun
-from excite_cli.diagnosis.naming import information_of, named_effects, order_of, rounds_of
+from excite_cli.diagnosis.naming import information_of, named_effects, rounds_of
 from excite_cli.diagnosis.own_torque import at_its_own_torque
 from excite_cli.diagnosis.records import (
     CUT_SHORT,
@@ -38,7 +36,6 @@ from excite_cli.diagnosis.records import (
     Assumption,
     Diagnosis,
     EffectRecord,
-    ErrorPath,
     JointAlias,
     Textbook,
     by_joint,
@@ -53,7 +50,6 @@ from excite_cli.diagnosis.single_runs import (
 from excite_cli.diagnosis.sufficient import comparison_of, sufficient
 from excite_cli.diagnosis.textbook import textbook
 from excite_cli.diagnosis.traces import Traces
-from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.diagnosis.words import assumption_in_words
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import standard_parameter_names
@@ -228,7 +224,6 @@ def diagnose(
         joint_aliases=_joint_aliases(traced, doubts),
         trained=trained.errors(after),
         inertia_names=standard_parameter_names(robot),
-        path=_path(traced, list(named), errors, worth),
         inertia_parts=by_joint(robot.joint_names, taken_off[INERTIAS]) if from_urdf else {},
         friction_lines=with_worth(lines, held, traced, with_all, taken_off),
     )
@@ -244,22 +239,6 @@ def _textbook(book: Sequence[int], traced: SearchResult, played: Played) -> Text
     fitted = refitted(traced, book)
     added = _records(fitted, played.robot)[len(traced.model.declared) :]
     return Textbook(added, played.errors(played.predictions(fitted)))
-
-
-def _path(
-    traced: SearchResult, named: Sequence[int], errors: HeldOutErrors, worth: Mapping[int, Worth]
-) -> ErrorPath | None:
-    """The error against the number of effects; `named` are candidates in the order of the effects.
-
-    What was weighed tells comes first and is in the smallest model, whatever the error says.
-    """
-    weighed = {i for i, each in worth.items() if each.verdict is HeldOutVerdict.WEIGHED}
-    order = sorted(order_of(traced), key=lambda i: i not in weighed)
-    found = error_path(traced, order, errors)
-    if found is None:
-        return None
-    smallest = max(found.smallest, len(weighed))
-    return replace(found, smallest=smallest, effects=tuple(map(named.index, order)))
 
 
 def _prepared(spec: Spec, parts: Split) -> tuple[Processing, list[PreparedRun]]:

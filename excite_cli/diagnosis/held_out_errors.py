@@ -13,12 +13,6 @@ Joining the model in one order, each effect takes off e(S) − e(S ∪ i); what 
 who came before. So its part is the mean over many orders (Shapley 1953), drawn with a fixed seed,
 in which what an effect refines joins before it. In every order the steps add up to e(∅) − e(all),
 and so do the parts.
-
-How many of the effects are worth their complexity is chosen by training data left out of the fit,
-never by the held-out ones: in the order in which the rounds of the diagnosis took them, the best
-number is that of the least error there, and the smallest model is the first within one standard
-error of it (Breiman et al. 1984), the standard deviation over the training runs divided by the root
-of their number.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,7 +21,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.diagnosis.modelled_run import places_of, width_of
-from excite_cli.diagnosis.records import ErrorPath, mean_of_known
 from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
@@ -106,7 +99,6 @@ _SEED = 20251123
 # Models that are fitted, about, and orders at most: of a Go2 with 54 effects 100 orders took a
 # fifth of the time.
 _MODELS, _ORDERS = 1500, 100
-_FEWEST_RUNS = 3  # of which a standard error says something
 
 
 def held_out_errors(
@@ -244,39 +236,3 @@ def _orders(traced: SearchResult, who: Sequence[int]) -> Iterator[list[int]]:
             waiting.remove(ready)
             order.append(ready)
         yield order
-
-
-def error_path(
-    traced: SearchResult, order: Sequence[int], held_out: HeldOutErrors
-) -> ErrorPath | None:
-    """The error with none, one, two … of the candidates in `order`; None if there are none."""
-    if not order:
-        return None
-    steps = [tuple(order[:count]) for count in range(len(order) + 1)]
-    left_out = _left_out(traced, steps)  # (steps, folds)
-    if not left_out.shape[1]:
-        return None
-    mean = left_out.mean(axis=1)
-    best = int(np.argmin(mean))
-    folds = left_out.shape[1]
-    error = float(left_out[best].std(ddof=1) / np.sqrt(folds)) if folds > 1 else 0.0
-    smallest = int(np.flatnonzero(mean <= mean[best] + error)[0])
-    kept = (INERTIAS,) if INERTIAS in held_out.who else ()
-    on_held_out = [mean_of_known(held_out.of((*kept, *sorted(step)))) for step in steps]
-    return ErrorPath(
-        tuple(map(float, mean)), tuple(on_held_out), error, best, smallest, folds >= _FEWEST_RUNS
-    )
-
-
-def _left_out(traced: SearchResult, steps: Sequence[tuple[int, ...]]) -> Array:
-    """Share (steps, runs) of the declared model's RMS that remains of blocks left out in turn.
-
-    Mean over the joints of which a run says something; runs that say nothing are left away.
-    """
-    blocks, n = traced.judge.plain.in_turn, traced.data.n
-    energies = np.array([blocks.energies(s).reshape(n, -1, 2).sum(axis=2) for s in steps])
-    first = energies[0]  # (joints, folds)
-    seen = first > 0.0
-    shares = np.sqrt(np.where(seen, energies / np.where(seen, first, 1.0), 0.0)).sum(axis=1)
-    known = seen.any(axis=0)
-    return np.asarray(shares[:, known] / seen.sum(axis=0)[known])

@@ -110,25 +110,6 @@ class Textbook:
 
 
 @dataclass(frozen=True)
-class ErrorPath:
-    """Errors with the first 0, 1, … K effects in the order of the rounds; `effects` in this order.
-
-    `left_out` (K + 1): on training runs left out, as a share of the declared model's; `held_out`
-    (K + 1): relative, where joints move, mean over them. `best` has the least of the former;
-    `smallest` is the first number within one `standard_error` of it. `enough`: runs left out to
-    rely on that.
-    """
-
-    left_out: tuple[float, ...]
-    held_out: tuple[float, ...]
-    standard_error: float
-    best: int
-    smallest: int
-    enough: bool
-    effects: tuple[int, ...] = ()
-
-
-@dataclass(frozen=True)
 class FrictionLine:
     """Viscous and Coulomb friction of a joint as data sheets give it.
 
@@ -319,18 +300,10 @@ class Diagnosis(Shown):
     joint_aliases: tuple[JointAlias, ...] = ()
     friction_lines: tuple[FrictionLine, ...] = ()
     inertia_parts: dict[str, float] = field(default_factory=dict)
-    path: ErrorPath | None = None
     inertia_names: tuple[str, ...] = ()
     trained: Errors | None = None
     skeleton: Skeleton | None = None
     recorded: Recorded = field(default_factory=Recorded)
-
-    @property
-    def smallest(self) -> tuple[NamedEffect, ...]:
-        """The effects of the smallest model that is within one standard error of the best."""
-        if self.path is None:
-            return self.effects
-        return tuple(self.effects[i] for i in self.path.effects[: self.path.smallest])
 
     @property
     def baseline(self) -> Errors:

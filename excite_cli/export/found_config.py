@@ -19,12 +19,11 @@ def found_config(
     folder: Path,
     found: Diagnosis,
     path: Path,
-    smallest: bool = False,
     textbook: bool = False,
 ) -> str:
     """YAML text of `spec`, its effects the declared ones and those that were found.
 
-    Or the `smallest` set of these, or the `textbook`'s in their place.
+    Or the `textbook`'s in their place.
 
     Relative paths of `spec` start from `folder`; those of the text start from the folder of `path`,
     where it is to be written.
@@ -38,22 +37,19 @@ def found_config(
         tree["robot"]["package_dirs"] = [
             os.path.relpath(folder / each, target) for each in spec.robot.package_dirs
         ]
-    kept, after = found.effects, found.after.mean_relative_moving
-    if smallest and found.path is not None:
-        kept, after = found.smallest, found.path.held_out[found.path.smallest]
-    added = [named.effect for named in kept]
+    added = [named.effect for named in found.effects]
+    after = found.after.mean_relative_moving
     if textbook and found.textbook is not None:
         added, after = list(found.textbook.effects), found.textbook.error.mean_relative_moving
     records = [*found.declared, *added]
     effects = [effect_of(record, found.joint_names) for record in records]
     tree["effects"] = effect_specs(effects, found.joint_names)
     # Of fewer effects the values would be others; files of earlier versions do not name inertias.
-    if not (smallest or textbook) and len(found.inertia_names) == len(found.phi):
+    if not textbook and len(found.inertia_names) == len(found.phi):
         tree["identified"] = _identified(found, records)
-    some = f" of {len(found.effects)}" * smallest
     whence = "of the textbook's model" if textbook else "found by `excite diagnose`"
     comment = (
-        f"{len(added)}{some} effects {whence}, added to the declared model.\n"
+        f"{len(added)} effects {whence}, added to the declared model.\n"
         f"Mean relative error on {found.held_out_run}: {found.before.mean_relative_moving:.2%} "
         f"before, {after:.2%} after (moving samples)."
     )

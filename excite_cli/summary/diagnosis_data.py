@@ -109,7 +109,6 @@ def diagnosis_data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, An
             "samples": found.after.samples,
         },
         "textbook": [_record(each) for each in found.textbook.effects] if found.textbook else None,
-        "path": asdict(found.path) if found.path else None,
         "assumed": [asdict(each) for each in found.assumed],
         "noise_floor": found.noise_floor,
         "next_experiment": experiment,

@@ -3,7 +3,7 @@
 import json
 import re
 import shutil
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import h5py
 import pytest
 import yaml
 
-from excite_cli.api.diagnosing import diagnose, save_config
+from excite_cli.api.diagnosing import diagnose
 from excite_cli.api.loading import load_case
 from excite_cli.config.load import load_spec
 from excite_cli.store.diagnosis_file import read_diagnosis
@@ -117,7 +117,6 @@ def test_parts_add_up_to_the_fall_of_the_error(outcome: Outcome) -> None:
     assert answer["shares"] == {"friction": pytest.approx(1.0)}
     said = "Friction accounts for nearly all of the unmodelled torque, most on "
     assert answer["answer"].startswith(said)
-    assert answer["path"]["smallest"] == 2
 
 
 def test_lines_of_data_sheets_are_told_of_every_joint_with_friction(outcome: Outcome) -> None:
@@ -151,26 +150,6 @@ def test_the_file_holds_the_same_diagnosis(outcome: Outcome) -> None:
     assert "smoke_arm.urdf" in found.config
     assert found.versions
     assert answer["output"] == {"diagnosis": str(outcome.file), "config": str(outcome.better)}
-
-
-def test_the_smallest_model_is_written_alone(outcome: Outcome, tmp_path: Path) -> None:
-    """From a path of which one effect is enough."""
-    found = read_diagnosis(outcome.file)
-    assert found.path is not None
-    one = replace(found, path=replace(found.path, smallest=1))
-    case, path = load_case(SMOKE), tmp_path / "smallest.yaml"
-    save_config(path, case, one, smallest=True)
-    spec = load_spec(path)
-    assert spec.effects is not None
-    first = found.effects[found.path.effects[0]].effect
-    assert [(e.kind, e.joints) for e in spec.effects] == [(first.kind, first.joints)]
-    text = path.read_text()
-    assert text.startswith("# 1 of 2 effects found by `excite diagnose`")
-    assert f"{found.path.held_out[1]:.2%} after" in text
-    save_config(path, case, one)
-    whole = load_spec(path).effects
-    assert whole is not None
-    assert len(whole) == 2
 
 
 def test_the_model_is_there_in_numbers(outcome: Outcome) -> None:
@@ -303,10 +282,9 @@ def test_what_is_not_confirmed_is_written_where_that_is_asked_for(
     spec = load_spec(better)
     assert spec.effects is not None
     assert ("coulomb_friction", "elbow") in {(e.kind, e.joints[0]) for e in spec.effects}
-    for option in ("--apply-unconfirmed", "--smallest"):
-        alone = excite("diagnose", SMOKE, mended, *QUICK, option)
-        assert alone.returncode == 2
-        assert f"{option} says nothing without --apply" in alone.stderr
+    alone = excite("diagnose", SMOKE, mended, *QUICK, "--apply-unconfirmed")
+    assert alone.returncode == 2
+    assert "--apply-unconfirmed says nothing without --apply" in alone.stderr
 
 
 @pytest.mark.parametrize("command", ["diagnose", "identify"])

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.held_out_errors import INERTIAS, HeldOutErrors, error_parts, error_path
+from excite_cli.diagnosis.held_out_errors import INERTIAS, HeldOutErrors, error_parts
 from excite_cli.robot.model import Array
 
 JOINTS = 2
@@ -85,61 +85,3 @@ def test_errors_are_those_of_the_fitted_columns() -> None:
     half = rows @ np.array(fits[(0,)]) + (lacks[0] + lacks[1]) / 2
     assert errors.of((0,))[0] == pytest.approx(relative(half))
     assert np.isnan(errors.of((0,))[1])
-
-
-class Plain:
-    """Energies of both sides of each run (n, 2 F) by the number of chosen candidates."""
-
-    def __init__(self, shares: list[list[float]], moves: Any = True) -> None:
-        self.shares, self.moves = np.array(shares), moves
-
-    @property
-    def in_turn(self) -> "Plain":
-        return self
-
-    def energies(self, chosen: tuple[int, ...]) -> Array:
-        weights = 7.0 * (1.0 + np.arange(JOINTS))[:, None]
-        by_run = np.where(self.moves, weights * np.square(self.shares[len(chosen)]), 0.0)
-        return np.stack([0.25 * by_run, 0.75 * by_run], axis=2).reshape(JOINTS, -1)
-
-
-def path_of(shares: list[list[float]]) -> Any:
-    count = len(shares) - 1
-    outcome: Any = SimpleNamespace(
-        judge=SimpleNamespace(plain=Plain(shares)), data=SimpleNamespace(n=JOINTS)
-    )
-    return error_path(outcome, tuple(range(count)), made_up(tuple(range(count))))
-
-
-def test_the_smallest_model_is_within_one_standard_error_of_the_best() -> None:
-    last = [0.10, 0.20, 0.30]
-    deviation = np.std(last, ddof=1) / np.sqrt(3)
-    far, near = 0.2 + 1.01 * deviation, 0.2 + 0.99 * deviation
-    path = path_of([[1.0] * 3, [far] * 3, [near] * 3, last, [0.21, 0.2, 0.3]])
-    assert path.left_out == pytest.approx((1.0, far, near, 0.2, 0.71 / 3))
-    assert (path.best, path.smallest, path.enough) == (3, 2, True)
-    assert path.standard_error == pytest.approx(deviation)
-    assert len(path.held_out) == 5
-
-
-def test_runs_that_move_some_joints_only_count_for_those() -> None:
-    """As short moves do; nothing is known where no run says anything."""
-
-    moves = np.array([[True, False, False], [False, True, False], [False] * 3])
-    outcome: Any = SimpleNamespace(
-        judge=SimpleNamespace(plain=Plain([[1.0] * 3, [0.5, 0.1, 0.7]], moves[:JOINTS])),
-        data=SimpleNamespace(n=JOINTS),
-    )
-    path = error_path(outcome, (0,), made_up((0,)))
-    assert path is not None
-    assert path.left_out == pytest.approx((1.0, 0.3))
-    assert not path.enough
-    outcome.judge.plain = Plain([[0.0] * 3, [0.0] * 3])
-    assert error_path(outcome, (0,), made_up((0,))) is None
-
-
-def test_two_runs_left_out_are_not_enough_to_rely_on() -> None:
-    assert not path_of([[1.0, 1.0], [0.1, 0.2]]).enough
-    assert path_of([[1.0], [0.1]]).standard_error == 0.0
-    nothing: Any = None
-    assert error_path(nothing, (), nothing) is None

@@ -88,8 +88,7 @@ def differences(one: Diagnosis, other: Diagnosis) -> list[str]:
 
 def unjudged(found: Diagnosis) -> Diagnosis:
     effects = tuple(replace(each, verdict=None, removes={}, parts={}) for each in found.effects)
-    path = found.path and replace(found.path, held_out=())
-    return replace(found, effects=effects, path=path)
+    return replace(found, effects=effects)
 
 
 def same(one: Any, other: Any) -> bool:

@@ -128,8 +128,6 @@ def test_a_diagnosis_finds_every_gain_by_it(robot: Robot, data: Dataset) -> None
         assert abs(value.value - gain) < 4.0 * value.std
     assert {each.verdict for each in found.effects} == {HeldOutVerdict.WEIGHED}
     assert found.after.mean_relative < 0.4 * found.before.mean_relative
-    assert found.path is not None
-    assert found.path.smallest == robot.n  # none of them may be left away
 
 
 def test_ten_parameters_of_a_body_that_hangs_on_a_link(robot: Robot) -> None:
