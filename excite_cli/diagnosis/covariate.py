@@ -3,7 +3,9 @@
 import re
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Literal, Self
+from typing import Any, Literal, Self
+
+from pydantic_core import core_schema
 
 from excite_cli.effects.base import Quantity
 
@@ -78,6 +80,11 @@ class Covariate:
             raise ValueError(f"'{code}' is nothing that a residual may depend on")
         own, aspect, symbol, joint = found.groups()
         return cls(_OF_SYMBOLS[symbol], joint or "", Aspect(aspect or ""), bool(own))
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> core_schema.CoreSchema:
+        """Records in files hold its code."""
+        return core_schema.no_info_plain_validator_function(cls.of_code)
 
 
 _CODE = re.compile(

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from math import isnan, nan
-from typing import Any
+from typing import Annotated, Any
 
 from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.covariate import Covariate
@@ -11,6 +11,7 @@ from excite_cli.diagnosis.traces import Traces
 from excite_cli.diagnosis.verdict import HeldOutVerdict, Verdict
 from excite_cli.effects.base import Value
 from excite_cli.effects.catalogue import catalogue
+from excite_cli.fields import shape
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.measurement.campaign_clock import Recorded
@@ -236,11 +237,11 @@ class Information:
     `noise` (n,) per moved joint [N·m] belongs to independent samples.
     """
 
-    factor: Array
+    factor: Annotated[Array, shape("rows", "k", finite=True)]
     rank: int
     model: tuple[EffectRecord, ...]
     rivals: tuple[EffectRecord, ...]
-    noise: Array
+    noise: Annotated[Array, shape("n", finite=True)]
 
 
 CUT_SHORT = "cut_short"  # the kind of a finding: the search did not come to its end
@@ -272,8 +273,8 @@ class Diagnosis(Shown):
     config: str
     config_folder: str
     fingerprint: str
-    joint_names: tuple[str, ...]
-    base_names: tuple[str, ...]
+    joint_names: Annotated[tuple[str, ...], shape("n")]
+    base_names: Annotated[tuple[str, ...], shape("r")]
     declared: tuple[EffectRecord, ...]
     effects: tuple[NamedEffect, ...]
     absorbed: tuple[Absorbed, ...]
@@ -283,9 +284,9 @@ class Diagnosis(Shown):
     rounds: tuple[Round, ...]
     findings: tuple[Finding, ...]
     processing: dict[str, Any]
-    phi: Array
-    base_values: Array
-    base_std: Array
+    phi: Annotated[Array, shape("P", finite=True)]
+    base_values: Annotated[Array, shape("r")]
+    base_std: Annotated[Array, shape("r")]
     information: Information
     versions: dict[str, str]
     seconds: float = 0.0

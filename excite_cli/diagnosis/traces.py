@@ -1,8 +1,10 @@
 """What a diagnosis keeps of the data it saw, so that a report needs no data: frozen records."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 from excite_cli.diagnosis.covariate import Covariate
+from excite_cli.fields import shape
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.robot.model import Array
 
@@ -21,15 +23,15 @@ class EffectTrace:
     kind: str
     joints: tuple[str, ...]
     runs: tuple[str, ...]
-    rows: tuple[str, ...]
+    rows: Annotated[tuple[str, ...], shape("rows")]
     quantity: str
     unit: str
     period: float | None
-    part: Array
-    t: Array
-    x: Array
-    own: Array
-    partial: Array
+    part: Annotated[Array, shape("k", finite=True)]
+    t: Annotated[Array, shape("k", finite=True)]
+    x: Annotated[Array, shape("k", "rows")]
+    own: Annotated[Array, shape("k", "rows")]
+    partial: Annotated[Array, shape("k", "rows")]
     covariate: str = ""
 
 
@@ -37,9 +39,9 @@ class EffectTrace:
 class Dependence:
     """`shares` (n, K), 0 to 1: of the residual of each of `joints`, by each of `quantities`."""
 
-    joints: tuple[str, ...]
+    joints: Annotated[tuple[str, ...], shape("rows")]
     quantities: tuple[Covariate, ...]
-    shares: Array
+    shares: Annotated[Array, shape("rows", "K")]
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class Traces:
     is left.
     """
 
-    torque_units: tuple[str, ...]
+    torque_units: Annotated[tuple[str, ...], shape("n")]
     runs: tuple[TorqueTrace, ...]
     effects: tuple[EffectTrace, ...]
     dependence: Dependence

@@ -22,6 +22,7 @@ one by one, the farthest first, wholly or, where the data do not let that be, in
 """
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from scipy.linalg import block_diag, solve_triangular
@@ -29,6 +30,7 @@ from scipy.linalg import block_diag, solve_triangular
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.nearest_inertias import nearest_inertias
 from excite_cli.dynamics.pseudo_inertia import smallest_eigenvalues
+from excite_cli.fields import shape
 from excite_cli.identification.factors import Mask, triangle_of
 from excite_cli.identification.prior import InertialPrior
 from excite_cli.robot.model import Array
@@ -51,9 +53,9 @@ class ConsistentParameters:
     prior as a share of what they were given as (`consistent_near_prior`).
     """
 
-    phi: Array
-    effects: Array
-    eigenvalues: Array
+    phi: Annotated[Array, shape("P", finite=True)]
+    effects: Annotated[Array, shape("e", finite=True)]
+    eigenvalues: Annotated[Array, shape("bodies", finite=True)]
     cost: float
     status: str
     solved: bool

@@ -8,6 +8,7 @@ settles. If asked, a physically consistent full set of standard parameters is fo
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from excite_cli.dynamics.pseudo_inertia import body_lengths
 from excite_cli.dynamics.regressor import standard_parameter_unit, standard_parameters
 from excite_cli.effects.base import Effect, Parameter, Value
 from excite_cli.effects.parameter import unit_of_slider
+from excite_cli.fields import shape
 from excite_cli.identification.consistent import (
     ConsistentParameters,
     consistent_near_prior,
@@ -61,20 +63,20 @@ class Fit(Shown):
 
     method: str
     inertias: str
-    joint_names: tuple[str, ...]
+    joint_names: Annotated[tuple[str, ...], shape("n")]
     effects: tuple[Effect, ...]
     rank: int
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    words: tuple[str, ...]
-    values: Array
-    std: Array
-    relative_std: Array
-    identifiable: Mask
-    essential: Mask
-    covariance: Array
-    noise: Array
-    phi: Array
+    names: Annotated[tuple[str, ...], shape("p")]
+    units: Annotated[tuple[str, ...], shape("p")]
+    words: Annotated[tuple[str, ...], shape("p")]
+    values: Annotated[Array, shape("p", finite=True)]
+    std: Annotated[Array, shape("p")]
+    relative_std: Annotated[Array, shape("p")]
+    identifiable: Annotated[Mask, shape("p")]
+    essential: Annotated[Mask, shape("p")]
+    covariance: Annotated[Array, shape("p", "p")]
+    noise: Annotated[Array, shape("n")]
+    phi: Annotated[Array, shape("P", finite=True)]
     count: int
     samples: float
     consistent: ConsistentParameters | None = None

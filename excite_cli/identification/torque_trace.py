@@ -5,13 +5,16 @@ k-th sample is kept, the same ones of every quantity. Numbers are rounded to sin
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from excite_cli.fields import shape
 from excite_cli.identification.factors import Mask
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Array, Robot
+
+_Sampled = Annotated[Array, shape("m", "n")]
 
 MOST_SAMPLES = 1500  # per part of a run
 
@@ -28,15 +31,15 @@ class TorqueTrace:
 
     run: str
     held_out: bool
-    t: Array
-    q: Array
-    v: Array
-    a: Array
-    load: Array
-    measured: Array
-    counted: Mask
-    predicted: Array
-    before: Array | None = None
+    t: Annotated[Array, shape("m", finite=True)]
+    q: _Sampled
+    v: _Sampled
+    a: _Sampled
+    load: _Sampled
+    measured: _Sampled
+    counted: Annotated[Mask, shape("m", "n")]
+    predicted: _Sampled
+    before: _Sampled | None = None
 
 
 def torque_trace(

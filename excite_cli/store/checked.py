@@ -4,7 +4,7 @@ Whatever does not fit raises a ValueError that names the part; `opened` makes on
 """
 
 import json
-from collections.abc import Callable
+from collections.abc import Mapping, Sequence
 from functools import cache, lru_cache
 from typing import Any
 
@@ -14,6 +14,7 @@ from pydantic import TypeAdapter
 
 from excite_cli.config.load import parse_spec
 from excite_cli.config.spec import Spec
+from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.robot.model import Array
 
 Shape = tuple[int | None, ...]
@@ -97,12 +98,27 @@ def flags(dataset: Any, shape: Shape) -> NDArray[np.bool_]:
     return _shaped(dataset, shape, "b")
 
 
-def record(value: Any, kind: Any, known: Callable[[Any], Any] = lambda data: data) -> Any:
-    """A record of `kind` from its JSON text; `known` makes what stands in it as text a record."""
+def record(value: Any, kind: Any) -> Any:
+    """A record of `kind` from its JSON text."""
     words = value.decode() if isinstance(value, bytes) else value
     if not isinstance(words, str):
         raise ValueError("a record is not text")
-    return _adapter(kind).validate_python(known(json.loads(words)))
+    return _adapter(kind).validate_python(json.loads(words))
+
+
+def require_joints(
+    joints: Sequence[str], errors: Sequence[Errors], noise_floor: Mapping[str, float] | None
+) -> None:
+    """Raise ValueError where they are of other joints."""
+    found: list[Mapping[str, float]] = [
+        mapping
+        for each in errors
+        for mapping in (each.relative, each.relative_moving, each.rms, each.rms_raw)
+    ]
+    found += [each.samples for each in errors if each.samples]
+    others = set(noise_floor or ()) - set(joints)
+    if others or any(set(mapping) != set(joints) for mapping in found):
+        raise ValueError("its errors are those of other joints")
 
 
 @lru_cache(maxsize=8)

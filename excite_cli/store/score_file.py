@@ -1,7 +1,5 @@
 """Scores as HDF5: one JSON record."""
 
-import json
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +7,7 @@ from excite_cli.atomic import write_atomically
 from excite_cli.measurement.hdf5_writer import new_hdf5
 from excite_cli.scoring.records import Score
 from excite_cli.store import checked
+from excite_cli.store.codec import as_json
 from excite_cli.store.own_file import PROGRAM, OwnFile, is_marked, opened
 
 SCHEMA = 1
@@ -24,7 +23,7 @@ def write_score(path: Path, score: Score) -> None:
 def _write(path: Path, score: Score) -> None:
     with new_hdf5(path) as file:
         file.attrs.update({"program": PROGRAM, "content": CONTENT, "schema": SCHEMA})
-        file["score"] = json.dumps(asdict(score), ensure_ascii=False)
+        file["score"] = as_json(score)
 
 
 def read_score(path: Path) -> Score:

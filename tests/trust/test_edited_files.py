@@ -164,7 +164,7 @@ def test_export_of_other_joints_than_the_config_names(loop: Loop, tmp_path: Path
 
 def test_export_of_a_fit_of_other_bodies(loop: Loop, tmp_path: Path) -> None:
     def change(file: h5py.File) -> None:
-        for name in ("bodies/phi", "bodies/consistent/phi"):
+        for name in ("fit/phi", "fit/consistent/phi"):
             values = file[name][:-10]
             del file[name]
             file[name] = values
@@ -173,9 +173,9 @@ def test_export_of_a_fit_of_other_bodies(loop: Loop, tmp_path: Path) -> None:
     told = refused("export", file, "-f", "urdf", "-o", tmp_path / "m.urdf")
     assert "'links' are not those of its bodies" in told
 
-    def without_links(file: h5py.File) -> None:  # as earlier versions wrote it
+    def without_links(file: h5py.File) -> None:
         change(file)
-        del file["bodies/consistent/links"]
+        del file["fit/records/links"]
 
     file = edited(loop.fit, tmp_path / "g.h5", without_links)
     told = refused("export", file, "-f", "urdf", "-o", tmp_path / "m.urdf")
