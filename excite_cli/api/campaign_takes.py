@@ -48,7 +48,8 @@ class Takes:
         refused = partial(self._no_log_of, path, used, _silent)
         take = Take(motion.name, path, log, motion.seconds, log.with_suffix(".txt"), refused)
         self.measure.wait_for_earlier(take)
-        text = f"{motion.name}: {motion.seconds:.1f} s at {motion.pace:.0%} of its pace"
+        speed = f"at {motion.pace:.0%} of its planned speed"
+        text = f"{motion.name}: {motion.seconds:.1f} s, {speed}"
         self.tell(Note(Level.INFO, text))
         if log.exists() and not is_measured(log):  # the campaign was killed, or its program failed
             why = (

@@ -63,7 +63,10 @@ def _compared(
     found = [_snapshots(path) for path in paths]
     if len({kind for kind, _, _ in found}) > 1:
         told = ", ".join(f"{path}: {kind}" for path, (kind, _, _) in zip(paths, found, strict=True))
-        raise FileError(f"compare: the files are of different kinds ({told}). Give one kind.")
+        raise FileError(
+            f"compare: the files are of different kinds ({told}). Identify all logs, "
+            "or diagnose all."
+        )
     if len({robot for _, robot, _ in found}) > 1:
         raise FileError("compare: the files are of different robots. Give those of one.")
     days = [day for _, _, own in found for day in own]

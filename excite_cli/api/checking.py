@@ -127,7 +127,7 @@ def _slowed(problem: Problem, segment: Segment, share: float | None, tell: Tell)
         return segment
     limits = PaceLimits.of(problem.constraints, problem.robot.n)
     pace = slowing(limits, segment.trajectory, segment.coefficients, share)
-    tell(Note(Level.INFO, f"{segment.name}: judged at {100 * pace:.4g} % of its pace"))
+    tell(Note(Level.INFO, f"{segment.name}: slowed to {100 * pace:.4g}% of its planned speed"))
     return replace(segment, trajectory=segment.trajectory.slowed(pace))
 
 

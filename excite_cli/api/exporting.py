@@ -153,8 +153,8 @@ def export_answer(found: Exported) -> Answer:
         path = str(found.paths[0])
         return Answer((path,), {"format": found.format, "output": path})
     lines = tuple(
-        f"{each.path}: {each.name}, {each.instants} instants, {each.duration:.6g} s"
-        + (f", at {100 * each.pace:.4g} % of its pace" if found.slow is not None else "")
+        f"{each.path}: {each.name}, {each.instants} samples, {each.duration:.5g} s"
+        + (f", at {100 * each.pace:.4g}% of its planned speed" if found.slow is not None else "")
         + (f"; not proved: {each.doubt}" if each.doubt else "")
         for each in found.motions
     )
@@ -252,5 +252,8 @@ def _export_model(
         elif stored.what == "fit":
             write_models(stored.robot, read_fit(file).fit, {"parameters": path}, tell)
         else:
-            raise FileError(f"{file} is no fit: as yaml, only fits are exported.")
+            raise FileError(
+                f"{file} is not a fit; --format yaml takes fits only (write one "
+                "with excite identify -o)."
+            )
     return Exported(format, (path,))

@@ -45,8 +45,8 @@ def for_simulators(stored: StoredModel, kind: str) -> tuple[IdentifiedModel, tup
     if not joints:
         return model, ()
     text = (
-        f"friction of {', '.join(joints)} has a form that {kind.upper()} cannot hold: it is the "
-        "nearest viscous and Coulomb friction"
+        f"friction of {', '.join(joints)} is approximated by viscous and Coulomb friction, as "
+        f"{kind.upper()} has no other"
     )
     return model, (text,)
 

@@ -68,16 +68,17 @@ def ended(campaign: Campaign, until: float | None) -> Campaign:
         lacking.append("no exploration motion has been tested yet")
     elif until is not None and not (learned.torque_deviation or 0.0) <= until:
         lacking.append(
-            f"predicted-torque standard deviation is {learned.torque_deviation:.2g} σ of one "
-            f"sample, and sequence.until asks for {until:.2g}"
+            f"the predicted torque deviates by {learned.torque_deviation:.2g} times the standard "
+            f"deviation of the torque noise, and sequence.until asks for {until:.2g}"
         )
     if not lacking:
         text = (
             f"Converged: the model, identified without {last.motions[-1].name}, predicts that "
             f"motion at training level (held-out error {learned.after:.2%} of the torque)"
         )
-        told = f", without ambiguous effects ({', '.join(learned.effects)})"
-        return replace(campaign, ended="complete", reason=text + told * bool(learned.effects) + ".")
+        told = f" Effects: {', '.join(learned.effects)}; none is ambiguous."
+        reason = f"{text}.{told * bool(learned.effects)}"
+        return replace(campaign, ended="complete", reason=reason)
     why = ""
     if last.number >= asked.most_rounds:
         why = f"the budget of {asked.most_rounds} rounds (--max-rounds) is spent"

@@ -89,7 +89,7 @@ def impossible_bodies(robot: Robot) -> list[Result]:
             status, why = said
             text = f"{body.name} cannot be a body: {why}"
             if status == "doubt":
-                text = f"{body.name} is hardly a body: {why}"
+                text = f"{body.name} is hardly possible as a body: {why}"
             found.append(Result(NAME, "impossible_body", status, text))
     return found
 
@@ -110,8 +110,8 @@ def _judged(mass: float, moments: Array, reach: float) -> tuple[Status, str] | N
         )
     if moments[0] + moments[1] < (1.0 - _ROUNDED) * moments[2] - 1e-9:
         return "doubt", (
-            f"its moments of inertia are {told} kg·m² about its centre, of which no two may be "
-            "less than the third. Are they about another frame, or another unit?"
+            f"its principal moments {told} kg·m² violate the triangle inequality (any two must add "
+            "up to the third). Wrong frame or unit"
         )
     gyration = float(np.sqrt(moments[-1] / mass)) if mass > 1e-3 else 0.0
     if gyration > _LARGE * reach:

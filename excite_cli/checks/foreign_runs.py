@@ -18,7 +18,7 @@ from excite_cli.checks.textbook_fit import Explained, TextbookFit
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Robot
 
-NAME = "runs of this robot"
+NAME = "runs of one robot"
 _SAMPLES = 300
 # Share of the torques that the other run misses, in the median of the joints: of pairs of one robot
 # 0.02 to 0.12, of 27 of two robots 0.97 and more.

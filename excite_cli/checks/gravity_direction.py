@@ -71,8 +71,8 @@ class GravityDirection(SetupCheck):
         hangs = "leans" if angle < _LEANS else "hangs on a wall, under a ceiling, or leans"
         along = ", ".join(f"{x:.2f}" for x in after.gravity)
         return (
-            f"gravity pulls along ({along}) m/s² in the frame of the base, {angle:.3g}° from where "
-            f"the config has it: the robot {hangs}"
+            f"gravity is ({along}) m/s² in the frame of the base, {angle:.3g}° from the config's: "
+            f"the robot {hangs}"
         )
 
     def has_effect(self, before: Setup, after: Setup) -> bool:

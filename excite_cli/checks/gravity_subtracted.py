@@ -12,7 +12,7 @@ from excite_cli.config.spec import Spec
 class GravitySubtracted(SetupCheck):
     """Weight in the torques."""
 
-    name = "weight in the torques"
+    name = "gravity left in the torques"
     kind = "no_gravity"
     of_all = True
 

@@ -25,12 +25,12 @@ _OF_FILES: dict[str, tuple[str, ...]] = {
         "stamps", "gap", "jitter", "order", "truncated", "ragged", "uneven_periods", "interpolated",
         "slow_rate",
     ),
-    "values that are missing or held": (
+    "missing or frozen values": (
         "nan", "nan_torque", "nan_speed", "nan_position", "stuck", "stale", "held", "dead",
         "dead_torque", "mostly_constant", "saturated", "no_speed", "torque_steps",
     ),
     "names of columns": ("numbered", "words", "other_joints", "swapped", "sign"),
-    "angles of one turn": ("wrapped",),
+    "wrapped angles": ("wrapped",),
     "units of positions and time": ("units", "gain", "lag"),
     "limits of the joints": ("outside_limits", "torque_units"),
 }  # fmt: skip

@@ -13,7 +13,7 @@ from excite_cli.checks.trust import key_of
 from excite_cli.config.spec import Spec
 from excite_cli.measurement.dataset import Mask
 
-BELONG = "torques of this motion"
+BELONG = "torques match the motion"
 _MUCH = 0.4  # share of a joint's torque that is left, of which is told
 _FOREIGN = 0.85  # torques of which this is left have nothing to do with the motion
 
@@ -49,8 +49,8 @@ def _of_one_check(
     if settings:
         text += f" (set {written(settings)})"
     text += (
-        f". As they are, {shares[0]:.0%} of the torques of {_listed(names, shown)} do not fit the "
-        f"URDF with any friction; that way {shares[1]:.0%}."
+        f". As configured, the URDF with any friction leaves {shares[0]:.0%} of the torques of "
+        f"{_listed(names, shown)} unexplained; corrected {shares[1]:.0%}."
     )
     others = dict.fromkeys(
         f"{rival.check.sentence(names, step.before, rival.alternative.setup)}"
@@ -64,7 +64,7 @@ def _of_one_check(
         text += f" As likely: {'. Or: '.join(others)}."
     joints = sorted({j for step in steps for j in step.after.joints})
     own = written(check.trusted(names, spec, joints))
-    text += f" If that is right as it is, say so: {own}"
+    text += f" If the config is right, set {own}"
     status: Status = "fault" if any(step.is_certain for step in steps) else "doubt"
     named = joints or np.flatnonzero(shown).tolist()
     named_joints = tuple(names[j] for j in named)

@@ -144,8 +144,8 @@ def _along(solid: _Solid) -> tuple[float, float, float]:
 def _density_words(solid: _Solid) -> str:
     mass, litres = solid.body.mass, 1e3 * solid.volume
     return (
-        f"{mass:.3g} kg in a hull of {litres:.3g} l, {mass / solid.volume:.3g} kg/m³, where "
-        f"{_LIGHTEST:g} to {_DENSEST:g} can be"
+        f"density {mass / solid.volume:.3g} kg/m³ ({mass:.3g} kg in a convex hull of {litres:.3g} "
+        f"l) is outside {_LIGHTEST:g} to {_DENSEST:g}"
     )
 
 
@@ -154,9 +154,9 @@ def _outside_words(solid: _Solid) -> str:
     off = float(np.linalg.norm(body.centre - (solid.low + solid.high) / 2))
     gyration = float(np.sqrt(max(np.trace(body.spread), 0.0)))
     return (
-        f"its centre of mass is {1e3 * off:.3g} mm from the middle of the box around its shapes "
-        f"and joints, its radius of gyration √(tr I / 2m) is {1e3 * gyration:.3g} mm, and half the "
-        f"box's diagonal {1e3 * np.linalg.norm(half):.3g} mm"
+        f"centre of mass {1e3 * off:.3g} mm off the middle of its bounding box, radius of gyration "
+        f"√(tr I / 2m) {1e3 * gyration:.3g} mm, beside half the box's diagonal of "
+        f"{1e3 * np.linalg.norm(half):.3g} mm"
     )
 
 

@@ -17,7 +17,7 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.robot.link_frame import leaves, own_link
 from excite_cli.robot.model import Array, Robot
 
-NAME = "what carries the robot"
+NAME = "what supports the robot"
 _LEFT = 0.4  # of the energy of what the URDF leaves that upward forces may leave
 _WEIGHT = 0.5, 1.5  # of the robot, that they carry together
 _MOST_FEET = 4

@@ -63,7 +63,7 @@ class Clock(SetupCheck):
 class TorqueLag(SetupCheck):
     """Torques behind the positions."""
 
-    name = "torques and positions at one time"
+    name = "delay of torques"
     kind = "torque_lag"
     of_all = True
 

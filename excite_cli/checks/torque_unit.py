@@ -76,9 +76,8 @@ class TorqueUnit(SetupCheck):
         off = np.flatnonzero(np.abs(np.log(ratio)) > 1e-9).tolist()
         if len(off) == 1 and after.unit[off[0]] >= _UNKNOWN:
             return (
-                f"torques of {names[off[0]]} are far smaller than what bodies like the URDF's ask "
-                "for, and hold nothing but friction: of the motor before its gear, another unit, "
-                "or a counterbalance"
+                f"torques of {names[off[0]]} are far smaller than the URDF's bodies require, and "
+                "contain only friction: motor-side torque, a wrong unit, or a counterbalance"
             )
         whose = "all joints" if len(off) == len(names) > 1 else ", ".join(names[j] for j in off)
         return (

@@ -13,7 +13,7 @@ from excite_cli.checks.bodies import LinkBody, link_bodies
 from excite_cli.checks.result import Result, few
 from excite_cli.robot.model import Robot
 
-NAME = "left and right halves"
+NAME = "left-right symmetry"
 # Of 1,571 pairs of 106 descriptions 25 masses differ by more than 2 %, 37 inertias by this.
 _FACTOR = 1.5
 _COUNTS = 1e-3  # of all mass [kg/kg]: lighter links are placeholders

@@ -44,8 +44,8 @@ def _of_today(word: str) -> str:
 app = typer.Typer(
     name="excite",
     cls=HelpfulGroup,
-    help="Plan robot motions that make inertial parameters visible, and trace what a robot's model "
-    "lacks from what was measured. `excite COMMAND --help` has examples of each command.",
+    help="Plan robot motions that excite the inertial parameters, and find from measured data what "
+    "a robot's model lacks. `excite COMMAND --help` has examples of each command.",
     epilog="excite init --robot ur10 -o ur10.yaml\nexcite optimize ur10.yaml -o ur10.h5",
     no_args_is_help=True,
     add_completion=True,

@@ -71,7 +71,8 @@ def campaign(
         ),
     ] = 1.0,
     max_rounds: Annotated[
-        int, typer.Option("--max-rounds", rich_help_panel=_BUDGET, min=1, help="Rounds at most.")
+        int,
+        typer.Option("--max-rounds", rich_help_panel=_BUDGET, min=1, help="Rounds at the most."),
     ] = 8,
     max_seconds: Annotated[
         float,
@@ -79,7 +80,7 @@ def campaign(
             "--max-seconds",
             rich_help_panel=_BUDGET,
             min=0.0,
-            help="Seconds of motion after which no round begins; 0: no bound.",
+            help="No new round after so much motion [s]; 0: unlimited.",
         ),
     ] = 0.0,
     plain: Annotated[
@@ -134,8 +135,8 @@ def campaign(
     or a motion was not measured.
 
     Everything is in the folder, after every step: campaign.html (the page of all rounds),
-    model.yaml (the config with what was found), plans, motions, logs and diagnoses. --resume goes
-    on after any interruption, and measures nothing twice.
+    model.yaml (the config with what was found), plans, motions, logs and diagnoses. --resume
+    continues after any interruption without measuring anything again.
 
     Examples:
       excite campaign ur10.yaml --from-speed 0.3 \\

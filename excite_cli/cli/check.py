@@ -12,7 +12,7 @@ def check(
     config: options.Config,
     file: options.MotionFile,
     rate: Annotated[float, typer.Option("--rate", min=1.0, help="Instants per second [Hz].")] = 1e3,
-    random: Annotated[int, typer.Option("--random", min=0, help="Further random instants.")] = 0,
+    random: Annotated[int, typer.Option("--random", min=0, help="Additional random instants.")] = 0,
     meshes: Annotated[
         bool, typer.Option("--meshes/--no-meshes", help="Check the collision meshes, too.")
     ] = True,
@@ -34,7 +34,7 @@ def check(
 
     Margins are taken at controller rate (and at random instants); distances of capsules are
     measured a second time by Pinocchio and coal. Between the instants every constraint is proved
-    with bounds that share nothing with the optimiser's kinematics; the collision meshes are checked
+    with bounds independent of the optimiser's kinematics; the collision meshes are checked
     by Pinocchio and coal, too. A verdict is `proved` (at every instant), `sampled` (no
     violation seen, with the reason why it is not proved) or `BROKEN`. Exit status 1: something is
     broken.

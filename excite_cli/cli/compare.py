@@ -44,12 +44,12 @@ def compare(
     verbose: options.Verbose = False,
     no_progress: options.NoProgress = False,
 ) -> None:
-    """Report which parameters and effects changed between days, each with its test.
+    """Report which parameters and effects changed over time, each with its test.
 
-    Every parameter is tested for a day since which its value differs. The part that temperature or
-    another column of the log explains is regressed out first, where there are days enough. The
-    p-values are corrected for the number of parameters and of days. Of a score, every run is a day;
-    of fits and diagnoses, give two or more: january.h5 february.h5 march.h5.
+    Every parameter is tested for the data set from which on its value differs. The part that
+    temperature or another column of the log explains is regressed out first, where there are enough
+    of them. The p-values are corrected for the number of parameters and data sets. In a score,
+    every run is one; of fits and diagnoses, give two or more: january.h5 february.h5 march.h5.
 
     Examples:
       excite compare week.h5 -o week.html

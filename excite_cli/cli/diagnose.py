@@ -53,8 +53,9 @@ def diagnose(
     The declared model is fitted to all runs but the held-out one; its residual is traced to named
     effects, with their size, certainty, and the effects that these data cannot distinguish from
     them. The held-out run is used once, for the error before and after, and for the verdict on
-    every effect. A single run is cut into blocks, every third held out. --workers share the runs,
-    with the same numbers. Ctrl-C, or diagnosis.max_seconds, ends the search with the answer so far.
+    every effect. A single run is cut into blocks, every third held out. --workers split the
+    runs; the results are identical. Ctrl-C, or diagnosis.max_seconds, ends the search with the
+    answer so far.
 
     Exit status 1: effects were found, but the error on the held-out run did not fall.
 

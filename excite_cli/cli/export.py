@@ -24,7 +24,8 @@ def export(
             "--format",
             "-f",
             metavar="FORMAT",
-            help="csv, ros2, rosbag2, mcap, moveit, npz of motions; urdf, mjcf, c, yaml of models.",
+            help="csv, ros2, rosbag2, mcap, moveit, npz of motions; urdf, mjcf, c of models; yaml "
+            "of fits.",
             autocompletion=complete_format,
         ),
     ],
@@ -73,7 +74,7 @@ def export(
         typer.Option(
             "--thresholds",
             metavar="FILE.json",
-            help="Those of score --thresholds: c has a collision detector with them.",
+            help="Thresholds of `score --thresholds`: adds a collision detector to c.",
         ),
     ] = None,
     allow_unproved: Annotated[
@@ -92,15 +93,15 @@ def export(
     """Write motions in the formats that controllers take, or a model for simulators and in C.
 
     Positions, speeds and accelerations come from the motion's coefficients, so they are exact at
-    any rate. The last instant is the motion's end; where the duration is no whole number of steps,
-    the last step is between half and one and a half of the others. Several motions go to files with
+    any rate. The last instant is the motion's end; if the duration is not a multiple of the step,
+    the last step is 0.5 to 1.5 steps long. Several motions go to files with
     their numbers in the name. With --entry the robot starts and ends at rest. Units: s, rad (m).
 
     A motion of a result that is not the one that was proved (its coefficients, verdict, config or
     robot changed since), or was written by an earlier version, is refused.
 
     A model is a fit, a diagnosis or a config of `diagnose --apply`. As C it is one file without
-    dependencies or allocation, with every effect that C can hold and a test of itself.
+    dependencies or allocation, with all effects that C can hold and a self-test.
 
     Examples:
       excite export ur10.h5 --format csv --motion 1 -o motion.csv

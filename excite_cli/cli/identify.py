@@ -64,10 +64,11 @@ def identify(
 
     Base parameters and those of the declared effects are fitted to all runs but the held-out
     one, on which the errors are measured. A single run is cut into blocks, of which every third is
-    held out. --workers share the runs, with the same numbers.
+    held out. --workers split the runs; the results are identical.
 
     With --only payload, mass, centre and inertia of what the robot carries are found from all runs,
-    while a fit of the robot alone is known as well as it says. Exit status 1: no body has them.
+    on top of the fit of the bare robot and its uncertainty. Exit status 1: they are physically
+    infeasible.
 
     Examples:
       excite identify ur10.yaml measured.h5 -o fit.h5

@@ -36,16 +36,23 @@ def init(
     package_dirs: Annotated[
         list[Path] | None,
         typer.Option(
-            "--package-dirs", metavar="FOLDER", help="Holds packages or meshes (may be repeated)."
+            "--package-dirs",
+            metavar="FOLDER",
+            help="Folder with packages or meshes (may be repeated).",
         ),
     ] = None,
     xacro_args: Annotated[
         list[str] | None,
-        typer.Option("--xacro-arg", metavar="NAME=VALUE", help="Of a xacro (may be repeated)."),
+        typer.Option(
+            "--xacro-arg", metavar="NAME=VALUE", help="Argument of a xacro (may be repeated)."
+        ),
     ] = None,
     srdf: Annotated[
         Path | None,
-        typer.Option("--srdf", help="Postures and pairs not to check. Default: beside the URDF."),
+        typer.Option(
+            "--srdf",
+            help="SRDF: named postures, disabled collision pairs. Default: beside the URDF.",
+        ),
     ] = None,
     allow_found: Annotated[
         bool,
@@ -64,12 +71,12 @@ def init(
     """Write a config that works for a robot, with comments that say what was chosen and why.
 
     Joints to move are chosen (no fingers, no wheels), with sensible limits where the URDF has none,
-    a posture clear of limits and of itself, and a pace that suits the slowest joint. Without
-    --robot and --urdf, the terminal is asked.
+    a posture clear of limits and self-collision, and a pace that suits the slowest joint. Without
+    --robot or --urdf, it asks at the terminal.
 
-    A robot's files read their own folder (or ROS package) and those of --package-dirs. What they
-    ask for elsewhere is looked for, and read after a yes at the terminal, or with --allow-found;
-    the config lists it under robot.package_dirs.
+    A robot's files read their own folder (or ROS package) and those of --package-dirs. Files
+    that they need from elsewhere are searched for, and read after confirmation (or with
+    --allow-found); the config lists their folders under robot.package_dirs.
 
     Example:  excite init --robot ur10
 

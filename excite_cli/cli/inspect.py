@@ -42,14 +42,14 @@ def inspect(
     verbose: options.Verbose = False,
     no_progress: options.NoProgress = False,
 ) -> None:
-    """Look at log and model before any physics: mount, zeros, signs, order, units, clock, bodies.
+    """Check log and model for set-up errors: mount, zeros, signs, order, units, clock, bodies.
 
     One row per check: ok, doubt or fault, the joints, the evidence, and the key of the config that
-    resolves it. Set-up errors are judged by one plain fit of the textbook's model: the set-up with
-    which it explains far more of the torques is the right one. Without data the
-    robot's description alone is looked at.
+    resolves it. Set-up errors are judged by fits of the textbook's model: a set-up with which it
+    explains far more of the torque is taken as right. Without data, only the robot's description
+    is checked.
 
-    Exit status 1: something is wrong for certain.
+    Exit status 1: at least one fault was found.
 
     Examples:
       excite inspect ur10.yaml measured.h5 --apply corrected.yaml

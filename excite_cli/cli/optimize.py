@@ -75,7 +75,7 @@ def optimize(
     verbose: options.Verbose = False,
     no_progress: options.NoProgress = False,
 ) -> None:
-    """Find motions that make the inertial parameters, and effects that are listed, visible.
+    """Find motions that excite the inertial parameters and the listed effects.
 
     Every stored motion keeps all constraints. With --after, the motion distinguishes the effects
     that the diagnosis could not; if there are none, it excites the model with all effects found, on
@@ -89,7 +89,7 @@ def optimize(
     Ctrl-C stores the best motion so far, proved as well; --resume plans that motion again.
 
     With --starts each motion is the best of many starts (successive halving), which --workers
-    processes or a dask cluster share; the result is the same to the last digit.
+    processes or a dask cluster share; the result is bit-identical.
 
     Examples:
       excite optimize ur10.yaml -o ur10.h5

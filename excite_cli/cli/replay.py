@@ -13,18 +13,18 @@ def replay(
     data: options.Data,
     held_out: Annotated[
         bool,
-        typer.Option("--held-out", help="Of the model's own data, only what was held out then."),
+        typer.Option("--held-out", help="Of the model's own data, use only the held-out part."),
     ] = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     verbose: options.Verbose = False,
     no_progress: options.NoProgress = False,
 ) -> None:
-    """Play recorded torques on the model as simulators get it: does it move as the robot did?
+    """Play recorded torques on the model as exported to simulators: does it move as the robot did?
 
     The model is exported to MJCF and driven by the measured torques in MuJoCo, beside the URDF as
-    it is. Both are held by the same loose position loop (10 rad/s), as no model follows torques
-    alone for long; the table has how far each deviates from the measured motion.
+    it is. Both are stabilised by the same low-gain position loop (10 rad/s), since no model tracks
+    on torques alone for long; the table shows how far each deviates from the measured motion.
 
     Exit status 1: the model deviates no less than the URDF.
 

@@ -53,7 +53,10 @@ def report(
     ] = None,
     config: Annotated[
         Path | None,
-        typer.Option("--config", help="The YAML file it was made with, to find a relative URDF."),
+        typer.Option(
+            "--config",
+            help="The YAML file it was made with: a URDF is relative to it.",
+        ),
     ] = None,
     picture: Annotated[
         bool, typer.Option("--picture/--no-picture", help="Show the robot on the page.")

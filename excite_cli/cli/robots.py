@@ -24,8 +24,8 @@ def robots(
 ) -> None:
     """List the available robots, or the joints of one with their limits.
 
-    The robots are those of the package example-robot-data. In a config, a name of the list stands
-    after a prefix, as in `robot: {urdf: example-robot-data:ur10}`; a URDF of yours is given by its
+    The robots are those of the package example-robot-data. In a config, prefix a
+    listed name, as in `robot: {urdf: example-robot-data:ur10}`; a URDF of yours is given by its
     path.
 
     Examples:

@@ -21,7 +21,7 @@ def schema(
     verbose: options.Verbose = False,
     no_progress: options.NoProgress = False,
 ) -> None:
-    """Print the JSON Schema of the config; editors complete and check from it.
+    """Print the JSON Schema of the config, for completion and checks in editors.
 
     An editor with the YAML language server (VS Code, Neovim, Emacs …) uses it if the first line of
     the config is `# yaml-language-server: $schema=excite.schema.json`, a path that starts from the

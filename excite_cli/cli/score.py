@@ -19,7 +19,7 @@ def score(
     ] = None,
     held_out: Annotated[
         bool,
-        typer.Option("--held-out", help="Of the model's own data, only what was held out then."),
+        typer.Option("--held-out", help="Of the model's own data, use only the held-out part."),
     ] = False,
     limits: Annotated[
         Path | None,
@@ -31,7 +31,8 @@ def score(
         ),
     ] = None,
     false_alarms: Annotated[
-        float, typer.Option("--false-alarms", help="Per hour, that the thresholds are made for.")
+        float,
+        typer.Option("--false-alarms", help="Allowed false alarms per hour."),
     ] = 1.0,
     workers: options.Workers = 1,
     scheduler: options.Scheduler = None,
@@ -43,15 +44,15 @@ def score(
 ) -> None:
     """Play a stored model on new data: does it still predict the torque, and if not, why?
 
-    Nothing is fitted. Every run has its error per joint beside that of the day the model was made,
-    and an alarm where its residual exceeds the model's tolerance, with the likely reason: a
-    payload, a contact, an offset, other friction, an encoder that slipped. Files are read one after
-    the other, so there may be hundreds.
+    Nothing is fitted. Each run's error per joint is listed beside that when the model was made, and
+    an alarm where its residual exceeds the model's tolerance, with the likely reason: a payload, a
+    contact, an offset, other friction, an encoder that slipped. Files are read one at a time, so
+    hundreds are fine.
 
     --thresholds: how large the residual of each joint may be, by speed and load, before a detector
-    that watches it says collision; the runs should be sound ones.
+    reports a collision; use fault-free runs.
 
-    Exit status 1: some run leaves what the model allows.
+    Exit status 1: a run exceeds the model's tolerance.
 
     Examples:
       excite score diagnosis.h5 measured.h5 -o week.h5

@@ -173,9 +173,9 @@ def simulate(
     """Play motions on a MuJoCo robot and record them as measured data.
 
     The robot has a tracking controller, encoders, torque noise, inertias that differ from the URDF,
-    the effects that the config declares, in plausible sizes, and those given with --effect. What
-    was put in is stored in the file's attribute `truth`. With --entry the robot starts and ends at
-    rest, and entry and return keep all constraints of the config.
+    the effects that the config declares, in plausible sizes, and those given with --effect. The
+    ground truth is stored in the file's attribute `truth`. With --entry the robot starts and ends
+    at rest, and entry and return keep all constraints of the config.
 
     Examples:
       excite simulate ur10.yaml ur10.h5 -o measured.h5 \\

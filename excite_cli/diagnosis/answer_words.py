@@ -63,8 +63,10 @@ def _missing(found: Diagnosis) -> str:
     """What the model misses, by share; of each the place where it is most."""
     if not found.effects:
         if found.complete:
-            return f"Nothing is missing: the residual is {_percent(found)} of torque RMS."
-        return f"No effect of the catalogue explains the residual ({_percent(found)})."
+            return f"Nothing is missing: held-out error {_percent(found)} of torque RMS."
+        return (
+            f"No effect of the catalogue explains the residual ({_percent(found)} of torque RMS)."
+        )
     if _in_vain(found):
         return (
             f"Adding {counted(len(found.effects), 'effect')} does not lower the error "
@@ -77,7 +79,7 @@ def _missing(found: Diagnosis) -> str:
         what = "nearly all of" if friction > _NEARLY_ALL else f"{friction:.0%} of"
         rubbing = [each for each in found.effects if _rubs(each)]
         which, most = _friction(rubbing, found), _most_friction(rubbing, found)
-        said.append(f"{which} accounts for {what} the unmodelled torque{most}.")
+        said.append(f"{which} accounts for {what} the error reduction{most}.")
     said += [
         f"On {_place(each, found)}: {title_of(each.effect.kind)} ({_first(each)}), given the "
         "known mass."
@@ -89,8 +91,9 @@ def _missing(found: Diagnosis) -> str:
     fall = found.fall if found.fall > 0.0 else inf
     worth = [each for each in others if each.error_reduction >= _WORTH_SAYING * fall]
     for each in sorted(worth, key=lambda each: -each.error_reduction)[:_MOST]:
-        share = f"{each.error_reduction / fall:.0%} of the unmodelled torque"
-        what = f"{title_of(each.effect.kind)} ({_first(each)}, {share})"
+        part = each.error_reduction / fall
+        share = f", {part:.0%} of the error reduction" if part <= 1.0 else ""
+        what = f"{title_of(each.effect.kind)} ({_first(each)}{share})"
         said.append(f"On {_place(each, found)}: {what}.")
     if not said:
         said.append(
@@ -102,7 +105,7 @@ def _missing(found: Diagnosis) -> str:
 
 
 def _weighed(named: NamedEffect) -> bool:
-    """Whether it based on the known mass, and no error need fall by it."""
+    """Whether it is based on the known mass, and no error need fall by it."""
     return named.verdict is HeldOutVerdict.WEIGHED
 
 
@@ -125,7 +128,7 @@ def _friction(rubbing: Sequence[NamedEffect], found: Diagnosis) -> str:
 
 
 def _most_friction(rubbing: Sequence[NamedEffect], found: Diagnosis) -> str:
-    """`, most on joint_1 (48 N·m at 1 rad/s)`, by the line of the joint with most of it."""
+    """`, largest on joint_1 (48 N·m at 1 rad/s)`, by the line of the joint with most of it."""
     joints = {joint for each in rubbing for joint in each.effect.joints}
     lines = [line for line in found.friction_lines if line.joint in joints]
     if not lines or len(rubbing) < 2:
@@ -133,7 +136,7 @@ def _most_friction(rubbing: Sequence[NamedEffect], found: Diagnosis) -> str:
     most = max(lines, key=lambda line: abs(line.viscous.value + line.coulomb.value))
     speed = "1 m/s" if "/m" in most.viscous.unit else "1 rad/s"
     size = short_number(most.viscous.value + most.coulomb.value, 2)
-    return f", most on {most.joint} ({size} {most.coulomb.unit} at {speed})"
+    return f", largest on {most.joint} ({size} {most.coulomb.unit} at {speed})"
 
 
 def _place(named: NamedEffect, found: Diagnosis) -> str:
@@ -166,9 +169,9 @@ def _left(found: Diagnosis) -> list[str]:
     if not known:
         return []
     worst = max(known, key=lambda joint: known[joint])
-    text = f"Residual {_percent(found)} of the torque"
+    text = f"Held-out error {_percent(found)} of torque RMS (mean over joints, where they move)"
     if known[worst] > 1.5 * found.after.mean_relative_moving:
-        text += f", most on {worst} ({relative_in_words(known[worst])})"
+        text += f", largest on {worst} ({relative_in_words(known[worst])})"
     said = [text + "."]
     for each in found.unexplained[:1]:
         words = [covariate_in_words(covariate) for covariate in each.depends_on]
@@ -187,7 +190,7 @@ def _next(found: Diagnosis) -> str:
         return f"Next: {first_of_all if warned else 'record another motion, or a longer one'}."
     open_names = [each for each in found.effects if each.aliases]
     if not open_names:
-        return "Next: use the model with its effects (--apply NEW.yaml)."
+        return ""
     by_motion = [each for each in open_names if not _weighed(each)]
     first = max(
         by_motion or open_names,
@@ -201,4 +204,4 @@ def _next(found: Diagnosis) -> str:
         return (
             f"Next: a run with a known load ({KNOWN_LOAD}) distinguishes {names}; no motion does."
         )
-    return f"Next: a motion that distinguishes {names} (excite optimize … --after)."
+    return f"Next: a motion that distinguishes {names}."

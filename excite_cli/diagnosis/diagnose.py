@@ -311,8 +311,8 @@ def _noticed(
         yield Finding(
             "one run",
             "warning",
-            f"Only one recording, {training[0].name}: training and test data share a motion. "
-            "Record a second motion, and spurious effects are rejected.",
+            f"Only one recording, '{training[0].name}': training and held-out data share a motion, "
+            "so spurious effects may pass. Record a second motion.",
             training[0].name,
         )
 

@@ -131,9 +131,11 @@ def plan_after(
     if wide is not None:
         assert wide.separation is not None
         names = [" / ".join(d.pair) for d in wide.separation.directions[::2]]
-        said.insert(0, f"the next motion separates what the data cannot: {'; '.join(names)}")
+        said.insert(
+            0, f"the next motion separates these indistinguishable effects: {'; '.join(names)}"
+        )
         return NextMotion(wide, problem, prior, "separate", tuple(said))
-    why = "no effects are indistinguishable" if not pairs else "no motion distinguishes the effects"
+    why = "all effects are distinguishable" if not pairs else "no motion distinguishes the effects"
     count = len(problem.extension.effects)
     beside = f" with its {count} effect{'s' if count > 1 else ''}" if count else ""
     said.insert(0, f"{why}: the next motion excites the model{beside}, on top of the measured data")

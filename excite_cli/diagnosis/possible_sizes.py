@@ -76,7 +76,7 @@ class PossibleSizes:
         variance = float(self._spread(chosen, slopes[:, None])[0, 0])
         if there > 0.0 and taken - there <= _ERRORS * np.sqrt(max(variance, 0.0)):
             return ""
-        return f"{taken:.3g} of {effect.kind} is more than the {effect.varied} that it varies"
+        return f"{effect.kind} of {taken:.3g} exceeds the {effect.varied} that it modulates"
 
     def _at(
         self, kind: str, joints: tuple[int, ...], count: int, chosen: Sequence[int]

@@ -65,9 +65,9 @@ def differences_between_runs(traced: SearchResult) -> tuple[Finding, ...]:
         f"{run}: {{{states.replace('%s', label)}}}" for run, label in ((one, "a"), (other, "b"))
     )
     text = (
-        f"{one} and {other} differ: {'; '.join(parts)}. Of two recordings neither says which is "
-        "usual, so this is not in the model, which has what suits both. Record a third one, or "
-        f"declare the states: runs: {{{declared}}}"
+        f"recordings {one} and {other} differ: {'; '.join(parts)}. With two recordings the normal "
+        "value is unknown: the model has one for both. Record a third one, or declare the states: "
+        f"runs: {{{declared}}}"
     )
     return (Finding("runs_differ", "warning", text),)
 

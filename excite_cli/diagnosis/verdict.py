@@ -8,9 +8,9 @@ class Verdict(StrEnum):
 
     ACCEPTED = "accepted"
     NOT_SIGNIFICANT = "not significant"
-    IMPOSSIBLE_SIGN = "physically infeasible sign"
+    IMPOSSIBLE_SIGN = "implausible size"
     TOO_SMALL = "too small to matter"
-    NO_GAIN = "no gain on runs left out"
+    NO_GAIN = "no gain on data left out"
     LATER = "deferred"
     EXPLAINED = "redundant"
 

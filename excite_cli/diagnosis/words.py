@@ -88,19 +88,19 @@ _TELLING = 0.2
 # What may be left, and why that is not sure: noise known, unknown, around reversals.
 _PERHAPS = (
     (
-        "Unexplained residual",
-        "larger than white noise, but coloured noise could be as large",
+        "Residual that may be noise",
+        "above white noise, but coloured noise could be as large",
     ),
     (
-        "Unexplained residual",
-        "the noise level is unknown: the torque was filtered, or recorded below 50 Hz",
+        "Residual beside unknown noise",
+        "the torque was filtered, or recorded below 50 Hz",
     ),
-    ("Residual at velocity reversals", "excluded from the fit: stiction"),
+    ("Residual at velocity reversals", "samples at reversals are excluded from the fit (stiction)"),
 )
 in_symbols = attrgetter("code")  # what a residual depends on, briefly: `q[elbow]`
 _QUANTITIES: dict[Source, str] = {
     "time": "time",
-    "run": "run",
+    "run": "the run",
     "position": "angle",
     "speed": "speed",
     "acceleration": "acceleration",
@@ -191,10 +191,10 @@ def approximation_in_words(
 ) -> str:
     """What an effect only comes near; covariates as `say` puts them."""
     if found.covariates:
-        return f"a function of {', '.join(map(say, found.covariates))}"
+        return f"depends on {', '.join(map(say, found.covariates))}"
     if not found.kind:
-        return "an effect that this term explains only in part"
-    return f"an effect of similar shape to {title_of(found.kind)}"
+        return "explained only in part"
+    return f"resembles {title_of(found.kind)}"
 
 
 def rests_in_words(
@@ -209,11 +209,11 @@ def rests_in_words(
     for rest in found.large_rests:
         left = (
             f"{rest.joint} {rest.rms:.3g} {units[rest.joint]} RMS ({rest.share_of_torque:.1%} of "
-            "its torque)"
+            "its torque in the training data)"
         )
         if rest.certain:
             noise = "" if rest.noise is None else f", noise {rest.noise:.3g} {units[rest.joint]}"
-            more.append(f"Excess residual: {left}{noise}; {_predicted(rest, say)}.")
+            more.append(f"Residual above noise: {left}{noise}; {_predicted(rest, say)}.")
         else:
             why = 2 if rest.at_reversals else int(rest.noise is None)
             perhaps[_PERHAPS[why]].append(left)
@@ -222,7 +222,7 @@ def rests_in_words(
 
 
 def _predicted(rest: LargeRest, say: Callable[[Covariate], str]) -> str:
-    share = f"{rest.predictable:.0%} of its energy is predictable"
+    share = f"{rest.predictable:.0%} of its variance is predictable"
     if rest.depends_on:
         best = " and ".join(map(say, rest.depends_on))
         return f"{share}, best from {best}; no effect of the catalogue has this form"
@@ -257,7 +257,7 @@ def ends_in_words(part: HeldOutEnds) -> str:
 
 
 def held_out_in_words(named: NamedEffect) -> str:
-    """`confirmed, 4.78 pp lower`: the verdict on held-out data and the change of that error.
+    """`confirmed, +4.78 pp`: the verdict on held-out data, and how the error changes without it.
 
     Percentage points of the relative error where the joint moves, of the joint where it changes
     most; that joint is named where the effect is not on it alone.
@@ -270,8 +270,7 @@ def held_out_in_words(named: NamedEffect) -> str:
         return named.verdict
     joint = max(moved, key=lambda name: abs(moved[name]))
     where = "" if named.effect.joints == (joint,) else f" on {joint}"
-    change = 100 * moved[joint]
-    return f"{named.verdict}, {abs(change):.2f} pp {'lower' if change >= 0 else 'higher'}{where}"
+    return f"{named.verdict}, {100 * moved[joint]:+.2f} pp{where}"
 
 
 def settled_in_words(found: Diagnosis) -> list[str]:
@@ -281,7 +280,7 @@ def settled_in_words(found: Diagnosis) -> list[str]:
     kinds = dict.fromkeys(each.kind for each in found.absorbed)
     known = [catalogue()[kind] for kind in kinds if kind in catalogue()]
     return [
-        f"{each.kind} is identifiable with {each.identified_by}."
+        f"{each.kind} becomes identifiable if {each.identified_by}."
         for each in known
         if each.identified_by
     ]

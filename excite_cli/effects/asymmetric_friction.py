@@ -19,7 +19,7 @@ class AsymmetricFriction(Effect):
     """τ_j = f⁺ (1 + sgn v_j)/2 − f⁻ (1 − sgn v_j)/2, both ≥ 0."""
 
     kind: ClassVar = "asymmetric_friction"
-    title: ClassVar = "asymmetric friction (differs between the directions)"
+    title: ClassVar = "direction-dependent friction"
     signature: ClassVar = "the residual jumps when the joint reverses, to levels of unequal height"
     function_of: ClassVar = ("speed",)
     friction: ClassVar = True

@@ -293,7 +293,7 @@ class Effect(ABC):
         """Why values are not `possible`, as a sentence."""
         given = zip(self.parameters, values, strict=True)
         reasons = [parameter.why_not(float(value)) for parameter, value in given]
-        return next((reason for reason in reasons if reason), "no effect of its kind is so")
+        return next((reason for reason in reasons if reason), "outside the range of this effect")
 
     def signal_to_error(self, values: Array, covariance: Array) -> float:
         """Size over error: above 1 beyond two standard deviations, or as rare for several."""

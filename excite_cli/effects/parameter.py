@@ -54,7 +54,7 @@ def whole_share(name: str) -> Parameter:
     """A share of something that is either taken away or not: one by nature."""
     return Parameter(
         name, "1", 0.3, 1.5, nonnegative=True, believed=(0.6, 1.5),
-        because="what is taken away is taken away wholly, so it is near 1",
+        because="it is lost wholly or not at all, so this is near 1",
     )  # fmt: skip
 
 

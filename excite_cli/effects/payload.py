@@ -43,7 +43,7 @@ class Payload(Effect):
     """
 
     kind: ClassVar = "payload"
-    title: ClassVar = "payload that the model does not have"
+    title: ClassVar = "unmodelled payload"
     signature: ClassVar = "residuals of gravity and inertia on many joints, in some runs only"
     scope: ClassVar[Scope] = "robot"
     parameters: ClassVar = (

@@ -26,13 +26,13 @@ class TorqueGain(Effect):
     parameters: ClassVar = (
         Parameter(
             "gain", "1", 0.005, 0.5, believed=(-0.5, 0.5),
-            because="half of the torque is no wrong constant but another unit or gear ratio",
+            because="a gain that is wrong by half is a wrong unit or gear ratio",
         ),
     )  # fmt: skip
     data_defect: ClassVar = True
     on_base: ClassVar = True
     of_whole_torque: ClassVar = True
-    identified_by: ClassVar = "a known payload on a run (identification.known_payload)"
+    identified_by: ClassVar = "one run carries a known payload (identification.known_payload)"
     usual: ClassVar = True
     changes_between_runs: ClassVar = True
 

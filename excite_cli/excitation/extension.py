@@ -169,7 +169,7 @@ def _absorbed(columns: Array, known: Array, names: list[str]) -> str:
         left = both[:, at] - both[:, :at] @ share
         if np.linalg.norm(left) < _NEW * np.linalg.norm(both[:, at]):
             most = [i for i in np.argsort(-np.abs(share))[:3] if abs(share[i]) > 0.01]
-            return f"the regressor shows it already in {', '.join(names[i] for i in most)}"
+            return f"collinear with {', '.join(names[i] for i in most)}"
     return ""
 
 

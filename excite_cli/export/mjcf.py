@@ -59,7 +59,7 @@ def mjcf(robot: Robot, model: IdentifiedModel) -> ModelText:
     _add_tendons(root, robot, parts)
     _add_couplings(root, robot, tree)
     ElementTree.indent(root)
-    notes = ["shapes, actuators and sensors are not in it"]
+    notes = ["it has no shapes, actuators or sensors"]
     if robot.payload is not None:
         notes.append(f"the payload ({robot.payload.in_words}) is part of its body")
     if left:

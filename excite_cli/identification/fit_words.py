@@ -11,10 +11,10 @@ _STANDS_OUT = 1.5  # times the typical joint
 
 
 def fixed_by_data(fit: Fit, i: int) -> str:
-    """`yes`, `yes (not significant)` (the fit is as good without it) or `NO`."""
+    """`yes`, `yes (zero within error)` (the fit is as good without it) or `NO`."""
     if not fit.identifiable[i]:
         return "NO"
-    return "yes" if fit.essential[i] else "yes (not significant)"
+    return "yes" if fit.essential[i] else "yes (zero within error)"
 
 
 def relative_in_words(share: float) -> str:
@@ -55,8 +55,8 @@ def consistency_in_words(fit: Fit) -> str:
     if not consistent.solved:
         return f"No physically consistent set of parameters was found: {consistent.status}."
     return (
-        "A physically consistent set of all standard parameters costs "
-        f"{max(consistent.cost, 0.0) ** 0.5:.1f} σ."
+        "Nearest physically consistent set of standard parameters: "
+        f"{max(consistent.cost, 0.0) ** 0.5:.1f} σ from the fit."
     )
 
 

@@ -50,11 +50,11 @@ class Hausman:
             return f"closed-loop bias: not testable, {self.reason}"
         origin = {"reference": "the reference motion", "periods": "repeated periods"}[self.source]
         figures = (
-            f"Durbin-Wu-Hausman with {origin}, F = {self.statistic:.3g} with {self.degrees} "
-            f"degrees of freedom, p = {self.p_value:.2g}"
+            f"Durbin-Wu-Hausman test, {origin} as instrument: p = {self.p_value:.2g}, F = "
+            f"{self.statistic:.3g} with {self.degrees} numerator degrees of freedom"
         )
         if self.p_value >= SIGNIFICANT:
-            return f"closed-loop bias: not found ({figures})"
+            return f"closed-loop bias: none detected ({figures})"
         return (
             f"closed-loop bias: the residual is correlated with the robot's deviation from "
             f"{origin} ({figures}); the controller feeds noise back, or the model lacks something"

@@ -209,8 +209,8 @@ def _hardly_moved(found: Fit) -> list[Finding]:
         return []
     more = f" and {len(found.kept) - _TOLD} more" if len(found.kept) > _TOLD else ""
     text = (
-        f"{len(found.kept)} of {found.rank} base parameters are weakly excited (the URDF would be "
-        "more accurate even if 100% off) and regularised to URDF values: "
+        f"{len(found.kept)} of {found.rank} base parameters are weakly excited (their standard "
+        "deviation exceeds the URDF's value) and regularised to URDF values: "
         f"{', '.join(found.kept[:_TOLD])}{more}."
     )
     return [Finding("kept", "note", text)]

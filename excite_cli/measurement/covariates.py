@@ -91,10 +91,9 @@ class DeclaredCovariates:
                 )
         if not self._untold:
             return []
-        first = next(iter(self._untold))
         text = (
-            f"further columns: {listed(list(self._untold))}. If friction or an offset may follow "
-            f"one of them, as a temperature, declare it: {_KEY}: [{first}]"
+            f"unused columns: {listed(list(self._untold))}. One that friction or offsets depend on "
+            f"(a temperature) can be declared: {_KEY}: [NAME]"
         )
         return [Finding("further_columns", "note", text)]
 

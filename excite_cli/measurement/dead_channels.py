@@ -105,9 +105,9 @@ def _mostly_constant(run: Run, joints: tuple[str, ...], known: Mask) -> list[Fin
         if share > _MOSTLY:
             text = (
                 f"torque of {joints[j]} is exactly {levels[counts.argmax()] + 0.0:.6g} in "
-                f"{share:.0%} of the samples in which it moves: the channel says little of it, "
-                "being too coarse, cut off near zero or not this joint's. Do without "
-                "(measurement.without_torque), or name another (measurement.channels, "
+                f"{share:.0%} of the samples in which it moves: the channel carries little "
+                "information (too coarse, a dead band, or another joint's). Exclude it "
+                "(measurement.without_torque), or map another (measurement.channels, "
                 "measurement.names)"
             )
             findings.append(Finding("mostly_constant", "warning", text, run.name, (joints[j],)))

@@ -135,13 +135,13 @@ def check_order(runs: Sequence[Run], joints: tuple[str, ...], used: bool = False
     return findings or check_lag(runs, used, where)
 
 
-# Positions of joints that turn, recorded as angles of one turn: they jump by 2π, and are undone.
+# Positions of joints that turn, recorded as wrapped angles: they jump by 2π, and are undone.
 #
 # A jump is the wrap's where the step that is left once whole turns are taken off it is one that the
 # joint makes elsewhere, too. Whole turns are added to all of a run until it lies within the limits.
 
 _TURN = 2 * np.pi
-_WHOLE = 1.001  # turns within which angles of one turn lie
+_WHOLE = 1.001  # turns within which wrapped angles lie
 _USUAL = 3.0  # times the largest step elsewhere that may be left of a jump
 _STEP = 0.02  # rad: so much a step may be whatever the others are
 

@@ -42,13 +42,13 @@ def with_torque_steps(
     if not coarse.any():
         return kept, []
     told = [
-        f"{joints[j]} of {steps[j]:.3g} ({share[j]:.0%} of its torque)"
+        f"{joints[j]} of {steps[j]:.3g} ({share[j]:.0%} of its RMS torque)"
         for j in np.flatnonzero(coarse)
     ]
     text = (
-        f"torques come in steps, by which they are wrong on average: {', '.join(told)}. Standard "
-        "deviations contain that; friction and offsets smaller than a step stay hidden. Record the "
-        "torque with more digits, or do without: measurement.without_torque"
+        f"torques are quantised: steps on {', '.join(told)}. Standard deviations account for it; "
+        "friction and offsets smaller than a step stay hidden. Record the torque with more digits, "
+        "or exclude it: measurement.without_torque"
     )
     named = tuple(joints[j] for j in np.flatnonzero(coarse))
     where = ", ".join(run.name for run in runs)

@@ -33,20 +33,20 @@ def check_lag(runs: Sequence[Run], used: bool, where: str) -> list[Finding]:
     filtered = _left([_behind_filter(run, seconds) for run in runs]) if seconds else np.inf
     if filtered < _BETTER * delayed:
         what = (
-            f"are the change of position behind a first-order filter of {seconds:.3g} s (which "
-            f"leaves {filtered:.2g} of them, a delay {delayed:.2g})"
+            f"are differentiated positions through a first-order low-pass of {seconds:.3g} s "
+            f"(relative misfit {filtered:.2g}; a pure delay: {delayed:.2g})"
         )
     else:
         way = "after" if lag > 0 else "before"
-        what = f"come {abs(lag) * 1e3:.3g} ms {way} the change of position"
+        what = f"come {abs(lag) * 1e3:.3g} ms {way} the differentiated positions"
     use = (
         "measurement.filter.velocity: measured makes accelerations of them; write differentiated"
         if used
         else "they are not used, positions are differentiated"
     )
     text = (
-        f"recorded speeds {what}: {use}. If positions or torques are late, a delay of the torque "
-        "will be found; leave the speeds out to end this (measurement.channels: {dq: null})"
+        f"recorded speeds {what}: {use}. If positions are delayed too, a torque delay is found. "
+        "To silence this, leave the speeds out (measurement.channels: {dq: null})"
     )
     return [Finding("lag", "warning", text, where)]
 

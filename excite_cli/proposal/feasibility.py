@@ -68,8 +68,9 @@ def first_posture(
             value = _BEND if joint.upper >= -joint.lower else -_BEND
         moved[joint.name] = min(max(value, low), high)
     others = {name: value for name, value in values.items() if name not in moved and value}
-    words = f"'{state}' of {file}" if values else "zero, elbows and knees bent"
-    return FirstPosture(moved, others, f"{words}, a tenth of the range inside the limits")
+    bent = any(any(word in name.lower() for word in _BENT) for name in moved)
+    words = f"'{state}' of {file}" if values else "zero" + ", elbows and knees bent" * bent
+    return FirstPosture(moved, others, f"{words}, at least a tenth of the range from the limits")
 
 
 Array = NDArray[np.float64]

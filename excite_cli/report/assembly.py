@@ -46,7 +46,7 @@ def inspection_page(found: Inspected, title: str) -> Page:
         sections.append(Section("settings", "What would change in the config", (cures,)))
     return Page(
         title,
-        "Log and model, before any physics",
+        "Log and model: set-up checks",
         (KeyFigure("faults", str(faults)), KeyFigure("doubts", str(doubts))),
         tuple(sections),
         (Text(headline(found), "good" if found.good else "bad"),),

@@ -23,7 +23,15 @@ from excite_cli.diagnosis.words import (
 )
 from excite_cli.report.page import Block, Section, Table, Text
 
-_COLUMNS = ("effect", "where", "size ± standard deviation", "p", "reduction", "gain", "held-out")
+_COLUMNS = (
+    "effect",
+    "where",
+    "size ± standard deviation",
+    "p",
+    "share",
+    "gain",
+    "held-out, without it",
+)
 
 
 def found_section(found: Diagnosis) -> Section:
@@ -63,9 +71,9 @@ def found_section(found: Diagnosis) -> Section:
     if found.approximations:
         blocks.append(
             Table(
-                (*_COLUMNS, "likely true form"),
+                (*_COLUMNS, "true form"),
                 tuple(_row(found, each) for each in found.approximations),
-                title="Surrogate terms (true form unknown)",
+                title="Surrogate terms (they approximate an effect that has no name)",
                 right=frozenset({3, 4, 5}),
             )
         )
@@ -85,7 +93,7 @@ def verdict(found: Diagnosis) -> str:
         f"With {what} the mean error of the torque on {found.held_out_run}, which took no part, "
         f"goes from {found.before.mean_relative_moving:.2%} to "
         f"{found.after.mean_relative_moving:.2%} where joints move (over all samples from "
-        f"{found.before.mean_relative:.2%} to {found.after.mean_relative:.2%}, 95 % interval "
+        f"{found.before.mean_relative:.2%} to {found.after.mean_relative:.2%}, 95% interval "
         f"{low:.2%} to {high:.2%})."
     )
 

@@ -86,7 +86,7 @@ def diagnosis_figures(diagnosis: Diagnosis) -> tuple[KeyFigure, ...]:
         KeyFigure(
             "error on held-out data, moving",
             f"{before.mean_relative_moving:.2%} → {after.mean_relative_moving:.2%}",
-            f"all samples {after.mean_relative:.2%}, 95 % interval {low:.2%} to {high:.2%}",
+            f"all samples {after.mean_relative:.2%}, 95% interval {low:.2%} to {high:.2%}",
         ),
         KeyFigure("effects found", str(len(diagnosis.named)), kinds or _none(diagnosis)),
         KeyFigure(
@@ -162,7 +162,7 @@ def _errors(diagnosis: Diagnosis) -> Section:
     lead = (
         f"On {diagnosis.held_out_run}, which took no part in choosing or fitting. Before: the "
         "declared model, fitted to the same training data; after: with the effects that were "
-        f"found. Mean over all samples after: {diagnosis.after.mean_relative:.2%}, 95 % interval "
+        f"found. Mean over all samples after: {diagnosis.after.mean_relative:.2%}, 95% interval "
         f"{low:.2%} to {high:.2%}. {untouched_in_words(diagnosis)}"
     )
     return Section("diagnosis-errors", "Error before and after", blocks, lead)

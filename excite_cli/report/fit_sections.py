@@ -92,7 +92,7 @@ def fit_figures(stored: StoredFit) -> tuple[KeyFigure, ...]:
         KeyFigure(
             "error on held-out data, moving",
             f"{error.mean_relative_moving:.2%}",
-            f"all samples {error.mean_relative:.2%}, 95 % interval {low:.2%} to {high:.2%}",
+            f"all samples {error.mean_relative:.2%}, 95% interval {low:.2%} to {high:.2%}",
         ),
         KeyFigure(
             "identifiable parameters",
@@ -124,7 +124,7 @@ def _errors(stored: StoredFit) -> Section:
     )
     lead = (
         f"Held-out: {stored.held_out_run}, which took no part in the fit. Mean relative error of "
-        f"the torque there {stored.error.mean_relative:.2%} (95 % interval {low:.2%} to "
+        f"the torque there {stored.error.mean_relative:.2%} (95% interval {low:.2%} to "
         f"{high:.2%}), {stored.error.mean_relative_moving:.2%} where joints move; on the training "
         f"data {stored.training_error.mean_relative:.2%}."
     )

@@ -228,8 +228,8 @@ def _file(urdf: str, root: Path) -> Found:
         offered = [f"{EXAMPLE_PREFIX}{name}" for name in example_robots()]
         meant = "" if "/" in urdf else nearest(f"{EXAMPLE_PREFIX}{urdf}", offered, 0.93)
         raise RobotError(
-            f"robot.urdf: there is no file {path}.{meant} Give a path relative to the YAML "
-            f"file, {EXAMPLE_PREFIX}<name> or {PREFIX}<name>."
+            f"robot.urdf: there is no file {path}.{meant} Give the path of a file (in a config "
+            f"relative to it), {EXAMPLE_PREFIX}<name> or {PREFIX}<name>."
         )
     return Found(path)
 

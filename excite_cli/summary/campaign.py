@@ -11,7 +11,11 @@ from excite_cli.shown.record import show
 def round_in_words(number: int, learned: RoundFindings) -> str:
     """`round 2: held-out error 1.32% → 0.19% of the torque on the newest motion; …`."""
     named = ", ".join(learned.effects) or "no effect"
-    left = "; open: " + "; ".join(learned.open) if learned.open else "; nothing is open"
+    left = (
+        "; open: " + "; ".join(learned.open)
+        if learned.open
+        else "; no ambiguous effects, nothing left to explain"
+    )
     return (
         f"round {number}: held-out error {learned.before:.2%} → {learned.after:.2%} of the torque "
         f"on the newest motion, with {named}{left}"
@@ -66,8 +70,8 @@ def campaign_answer(campaign: Campaign, folder: Path, written: dict[str, str]) -
     count = len(campaign.motions)
     total = (
         f"{len(campaign.rounds)} rounds, {count} motions, {campaign.seconds:.0f} s of motion. "
-        "(torques known to: share of one sample's noise, at random states; efficiency: information "
-        "efficiency relative to D-optimal free states)"
+        "(torque std: standard deviation of the predicted torque at random states, in σ of the "
+        "torque noise; efficiency: information relative to D-optimal free states)"
     )
     files = tuple(f"{what}: {folder / name}" for what, name in written.items())
     data = {

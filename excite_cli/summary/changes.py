@@ -5,12 +5,14 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
+from excite_cli.diagnosis.words import p_in_words
 from excite_cli.identification.fit_words import with_deviation
 from excite_cli.scoring.changes import Change, Changes
 from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
 from excite_cli.summary.cells import files_in_words
 
+_LEAST_P = 1e-16  # of any sum of so many rounded numbers, smaller ones say nothing
 _SHOWN = 12  # rows at least, changed or not
 _TOLD = 4
 
@@ -39,17 +41,17 @@ def _table(shown: Sequence[Change]) -> Table:
     rows = tuple(
         (
             change.name,
-            f"{change.before:.4g}",
+            f"{change.before:.4g}" if abs(change.before) > 1e-9 * change.std else "0",
             with_deviation(change.after, change.std),
             change.unit,
             change.since,
-            f"{change.p_value:.2g}" if change.p_value < 0.995 else "1",
+            p_in_words(change.p_value, _LEAST_P) if change.p_value < 0.995 else "1",
             "CHANGED" if change.significant else "",
         )
         for change in shown
     )
     return Table(
-        "Changes (± one standard deviation of the change; p corrected for parameters and days)",
+        "Changes (± std of the change; p corrected for the number of parameters and data sets)",
         ("parameter", "before", "after", "unit", "since", "p", "verdict"),
         rows,
         left=("parameter", "unit", "since", "verdict"),
@@ -60,19 +62,19 @@ def _table(shown: Sequence[Change]) -> Table:
 def sentences(found: Changes) -> list[str]:
     """What changed since when."""
     out = f" beside {', '.join(found.columns)}" if found.columns else ""
-    over = f"{len(found.days)} days, {len(found.changes)} parameters{out}"
+    over = f"{len(found.days)} data sets, {len(found.changes)} parameters{out}"
     if not found.significant:
-        return [f"Nothing changed that chance does not explain ({over})."]
-    told = [_told(change) for change in found.significant[:_TOLD]]
+        return [f"No significant change ({over})."]
+    # Sums of inertial parameters are hard to read: the table has them.
+    short = [each for each in found.significant if " " not in each.name] or found.significant
+    told = [_told(change) for change in short[:_TOLD]]
     more = len(found.significant) - len(told)
     rest = [f"and {more} more"] if more > 0 else []
     return [f"{'; '.join([*told, *rest])} ({over})."]
 
 
 def _told(change: Change) -> str:
-    verb = "rose" if abs(change.after) > abs(change.before) else "fell"
-    if change.before * change.after < 0.0:
-        verb = "went"
+    verb = "rose" if change.after > change.before else "fell"
     unit = f" {change.unit}" if change.unit not in ("", "1") else ""
     return (
         f"{change.name} {verb} from {change.before:.3g} to "

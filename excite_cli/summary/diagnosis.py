@@ -25,7 +25,7 @@ from excite_cli.diagnosis.words import (
     value_in_words,
 )
 from excite_cli.identification.fit_words import above_the_floor
-from excite_cli.shown.answer import Answer, Parts, Table
+from excite_cli.shown.answer import Answer, Command, Parts, Table, as_word
 from excite_cli.shown.record import show
 from excite_cli.summary.cells import files_in_words
 from excite_cli.summary.diagnosis_data import diagnosis_data
@@ -57,7 +57,7 @@ def diagnosis_answer(
     if not verbose:
         rounds = counted(len(found.rounds), "round")
         parts.append(f"({rounds} of tests; --verbose shows the rejected candidates, with reasons.)")
-    parts += [_next(experiment), next_command(config, place), *files_in_words(files)]
+    parts += [*files_in_words(files), *_next(found, experiment, config, files.get("diagnosis"))]
     return Answer(tuple(parts), {**diagnosis_data(found, experiment), "output": files}, found.good)
 
 
@@ -92,15 +92,18 @@ def _data_in_words(found: Diagnosis) -> str:
     cut = p.get("position_cutoff")
     standing = max(p.get("standstill_share", [0.0]), default=0.0)
     return (
-        f"{p['samples']} samples at {p['rate']:.3g} Hz; positions cut off at "
-        f"{'no frequency' if cut is None else f'{cut:.3g} Hz'}; joints stand still in up to "
-        f"{standing:.0%} of the samples, which the fit excludes. {p['candidates']} candidates; "
-        f"held out: {found.held_out_run}. Null inflation {p['inflation']:.2f} (corrected)."
+        f"{p['samples']} training samples at {p['rate']:.3g} Hz; positions "
+        f"{'not filtered' if cut is None else f'low-passed at {cut:.3g} Hz'}; standstill (up to "
+        f"{standing:.0%} of a joint's samples) excluded. {p['candidates']} candidates; held out: "
+        f"{found.held_out_run}. Test statistics are divided by {p['inflation']:.2f}, by which "
+        "time-shifted columns exceed χ²."
     )
 
 
 def _round_table(found: Diagnosis, each: Round) -> Table:
     worst = max(each.residual, key=lambda joint: each.residual[joint])
+    units = found.traces.torque_units if found.traces else ("",) * len(found.joint_names)
+    unit = dict(zip(found.joint_names, units, strict=True)).get(worst, "")
     rows = tuple(
         (
             suspect.effect.kind,
@@ -113,8 +116,9 @@ def _round_table(found: Diagnosis, each: Round) -> Table:
         for suspect in each.suspects
     )
     return Table(
-        f"Round {each.index}: residual up to {each.residual[worst]:.3g} ({worst}); {each.verdict}",
-        ("candidate", "where", "p", "share", "gain", "verdict"),
+        f"Round {each.index}: largest residual {each.residual[worst]:.3g} {unit} RMS ({worst}); "
+        f"{each.verdict} (p: of it alone; sets are judged together)",
+        ("candidate", "where", "p", "of residual", "gain on data left out", "verdict"),
         rows,
         words=("candidate", "where", "verdict"),
         bold=tuple(k for k, each in enumerate(each.suspects) if each.verdict is Verdict.ACCEPTED),
@@ -148,19 +152,23 @@ def _verdict(found: Diagnosis) -> str:
     return (
         f"{counted(len(found.named), 'effect')}"
         + (f", {counted(len(found.approximations), 'surrogate term')}" * bool(found.approximations))
-        + "; mean error "
-        f"{found.before.mean_relative_moving:.2%} → "
-        f"{found.after.mean_relative_moving:.2%} where joints move (over all samples "
-        f"{found.after.mean_relative:.2%}, 95 % interval {low:.2%} to {high:.2%}). "
+        + "; mean held-out error where joints move "
+        f"{found.before.mean_relative_moving:.2%} → {found.after.mean_relative_moving:.2%}; over "
+        f"all samples {found.after.mean_relative:.2%} (its 95% interval {low:.2%} to {high:.2%}). "
         f"{found.seconds:.1f} s."
     )
 
 
-def _next(experiment: dict[str, Any]) -> str:
+def _next(found: Diagnosis, experiment: dict[str, Any], config: str, file: str | None) -> Parts:
+    """What to do next, with the `file` of the diagnosis: commands that can be typed."""
+    if file is None:
+        return ["Next: repeat with -o DIAGNOSIS.h5, for a report and for the next motion."]
+    if found.complete:
+        return ["Next, with other data:", Command(("excite", "score", as_word(file), "DATA.h5"))]
+    purpose = "excite the model with what was found"
     if experiment["purpose"] == "separate":
-        count = len(experiment["pairs"])
-        return f"Next motion: distinguish {count} pair{'s' if count > 1 else ''} of effects:"
-    return "Next motion: excite the extended model:"
+        purpose = f"distinguish {counted(len(experiment['pairs']), 'pair')} of effects"
+    return [f"Next: plan a motion, to {purpose}:", next_command(config, file)]
 
 
 def _in_words(found: Diagnosis) -> str:

@@ -9,7 +9,7 @@ from excite_cli.shown.answer import Parts, Table
 from excite_cli.summary.cells import figure, floor_cells, floor_columns, percent
 from excite_cli.summary.named_effects import what_and_where
 
-_OFF = "reduced by (pp)"
+_OFF = "change by effect (pp)"
 _NAMED, _WORTH = 3, 0.1  # parts that are named in a row, and the least share of the fall
 _NOTHING = 5e-4
 _SEEN = 0.005  # share of the first error below which a part is one of the others
@@ -41,8 +41,9 @@ def _moving(found: Diagnosis) -> Table:
     mean = ("mean", *(percent(each.mean_relative_moving) for each in errors.values()))
     mean += ("",) * (3 + len(floor) + len(off))
     return Table(
-        f"Error of the torque on data never used ({found.held_out_run}), where joints move",
-        ("joint", *errors, "RMS before", "RMS after", "unit", *floor, *off),
+        f"Error of the torque on held-out data ({found.held_out_run}), where joints move (URDF as "
+        "given; declared model and textbook friction, both refitted)",
+        ("joint", *errors, "RMS declared", "RMS with effects", "unit", *floor, *off),
         (*rows, mean),
         left=("joint", "unit"),
         words=tuple(off),
@@ -55,9 +56,9 @@ def _errors(found: Diagnosis) -> dict[str, Errors]:
     """By heads of columns."""
     known = {
         "URDF": found.untouched,
-        "before": found.before,
+        "declared": found.before,
         "textbook": found.textbook.error if found.textbook else None,
-        "after": found.after,
+        "with effects": found.after,
     }
     return {head: each for head, each in known.items() if each is not None}
 
@@ -108,9 +109,10 @@ def _taken_off(found: Diagnosis, joint: str) -> str:
         return ""
     named = [p for p in parts if abs(p[1]) >= _WORTH * abs(whole)][:_NAMED]
     rest = parts[len(named) :]
-    told = [f"{name} {100 * part:.1f}" for name, part in named]
-    if rest:
-        told.append(f"{len(rest)} others {100 * sum(part for _, part in rest):.1f}")
+    told = [f"{name} {-100 * part:+.1f}" for name, part in named]
+    others = sum(part for _, part in rest)
+    if abs(others) >= _NOTHING:
+        told.append(f"{len(rest)} other{'s' * (len(rest) > 1)} {-100 * others:+.1f}")
     return ", ".join(told)
 
 
@@ -130,7 +132,8 @@ def _parts(found: Diagnosis) -> Table:
         rows.append((joint, first, f"{100 * relative:.2f}", figure(rms), unit[joint]))
         worth = [p for p in parts if abs(p[1]) >= _SEEN * abs(relative)]
         if rest := parts[len(worth) :]:
-            worth.append((f"{len(rest)} others", sum(part for _, part in rest)))
+            others = f"{len(rest)} other{'s' * (len(rest) > 1)}"
+            worth.append((others, sum(part for _, part in rest)))
         rows += [
             ("", name, f"{-100 * part:+.2f}", f"{-part * scale:+.3g}", unit[joint])
             for name, part in worth
@@ -138,11 +141,11 @@ def _parts(found: Diagnosis) -> Table:
         after = found.after.relative_moving[joint]
         rows.append(("", _LINES[2], f"{100 * after:.2f}", figure(after * scale), unit[joint]))
     return Table(
-        "Error reduction by effect (Shapley share: mean over orders), where joints move",
-        ("joint", "model", "error, %", "RMS", "unit"),
+        "Change of the error by each effect (Shapley share: mean over orders), where joints move",
+        ("joint", "contribution", "error or change, %", "RMS", "unit"),
         tuple(rows),
         left=("joint", "unit"),
-        words=("model",),
+        words=("contribution",),
         parted=tuple(parted[1:]),
     )
 
@@ -156,8 +159,8 @@ def _all_samples(found: Diagnosis) -> Table:
     ]  # fmt: skip
     mean = ("mean", *(percent(each.mean_relative) for each in errors.values()), "", "", "")
     return Table(
-        f"The same over all samples ({found.held_out_run}), standing joints too",
-        ("joint", *errors, "RMS before", "RMS after", "unit"),
+        f"Over all samples of {found.held_out_run}, including joints at rest",
+        ("joint", *errors, "RMS declared", "RMS with effects", "unit"),
         (*rows, mean),
         left=("joint", "unit"),
         bold=(len(rows),),

@@ -17,7 +17,7 @@ from excite_cli.identification.fit_words import (
 from excite_cli.identification.identify import Identification
 from excite_cli.identification.link_changes import Change, LinkChange
 from excite_cli.identification.stored_model import StoredFit
-from excite_cli.shown.answer import Answer, Parts, Table
+from excite_cli.shown.answer import Answer, Command, Parts, Table, as_word
 from excite_cli.shown.record import show
 from excite_cli.summary.cells import figure, files_in_words, floor_cells, floor_columns, percent
 
@@ -29,10 +29,10 @@ _TITLE = (
 _COLUMNS = (
     "link",
     "mass [kg]",
-    "URDF",
-    "centre [mm]",
-    "URDF's",
-    "identified",
+    "URDF mass [kg]",
+    "centre x, y, z [mm]",
+    "URDF centre [mm]",
+    "determined by data",
     "physically infeasible",
 )
 
@@ -48,7 +48,7 @@ def link_parts(links: Sequence[LinkChange]) -> Parts:
         "centre within two standard deviations of the URDF's."
     )
     rows = tuple(_row(link) for link in shown)
-    left = ("link", "identified", "physically infeasible")
+    left = ("link", "determined by data", "physically infeasible")
     return [
         *(
             [Table(_TITLE, _COLUMNS, rows, left=left, words=("physically infeasible",))]
@@ -109,8 +109,15 @@ def identification_answer(
 ) -> Answer:
     """What `excite identify` answers; `written` are the files that were requested, by kind."""
     files = {kind: str(path) for kind, path in written.items() if path is not None}
-    parts = (*identification_parts(found), *files_in_words(files))
+    parts = (*identification_parts(found), *files_in_words(files), *_next(found, files.get("fit")))
     return Answer(parts, {**_data(found), "output": files})
+
+
+def _next(found: Identification, file: str | None) -> Parts:
+    """What to do next with the `file` of the fit, unless a finding says it."""
+    if file is None or any(each.kind == "much_left" for each in found.findings):
+        return []
+    return ["Next, with other data:", Command(("excite", "score", as_word(file), "DATA.h5"))]
 
 
 def identification_parts(found: Identification) -> Parts:
@@ -119,8 +126,10 @@ def identification_parts(found: Identification) -> Parts:
     fit = found.fit
     sentences = [
         f"Mean relative error on {found.held_out_run}: {found.error.mean_relative:.2%} "
-        f"(95 % interval {low:.2%} to {high:.2%}), moving {found.error.mean_relative_moving:.2%}.",
-        f"Effective sample size: {fit.samples:.0f} of {fit.count}.",
+        f"(95% interval {low:.2%} to {high:.2%}); where joints move "
+        f"{found.error.mean_relative_moving:.2%}.",
+        f"Effective sample size: {fit.samples:.0f} of {fit.count} filtered torque samples of all "
+        "joints (their noise is correlated).",
         f"{found.hausman.sentence()[0].upper()}{found.hausman.sentence()[1:]}.",
     ]
     if fit.consistent is not None:
@@ -147,8 +156,9 @@ def _parameter_table(fit: Fit) -> Table:
         )
         for i, name in enumerate(fit.names)
     )
-    names = ("parameter", "value", "std", "relative", "unit", "identifiable")
-    return Table("Parameters", names, rows, left=("parameter", "unit", "identifiable"))
+    names = ("parameter", "value", "std", "relative std", "unit", "identifiable")
+    title = "Parameters (base parameters stand for sums of inertial ones, and may be negative)"
+    return Table(title, names, rows, left=("parameter", "unit", "identifiable"))
 
 
 def _error_table(found: Identification | StoredFit) -> Table:
@@ -169,8 +179,11 @@ def _error_table(found: Identification | StoredFit) -> Table:
         for joint, unit in zip(joints, units, strict=True)
         if not isnan(error.rms[joint])  # its torque was not measured
     )
-    title = "Error of the torque on held-out data (raw: as recorded; training: where it was fitted)"
-    names = ("joint", "moving", "all", "RMS", *floor_columns(floor), "raw RMS", "unit", "training")
+    title = "Torque error on held-out data (RMS: of all samples, filtered, and as recorded)"
+    names = (
+        "joint", "error, moving", "error, all", "RMS", *floor_columns(floor), "RMS unfiltered",
+        "unit", "training error",
+    )  # fmt: skip
     return Table(title, names, rows, left=("joint", "unit"))
 
 

@@ -91,9 +91,9 @@ def checks_table(found: Inspected) -> Table:
         for each in found.results
     )
     bold = tuple(k for k, each in enumerate(found.results) if each.status != "ok")
-    columns = ("check", "status", "joints", "resolved by")
-    words = ("joints", "resolved by")
-    return Table("Before any physics", columns, rows, columns, words, bold)
+    columns = ("check", "status", "joints", "key that resolves it")
+    words = ("joints", "key that resolves it")
+    return Table("Set-up checks", columns, rows, columns, words, bold)
 
 
 def remarks(found: Inspected) -> list[str]:
@@ -101,7 +101,11 @@ def remarks(found: Inspected) -> list[str]:
     texts = []
     for status, lead in (("fault", "fault: "), ("doubt", "doubt: "), ("ok", "")):
         own = [each for each in found.results if each.status == status and each.evidence]
-        texts += [f"{lead}{_where(each) if lead else ''}{each.evidence}." for each in own]
+        texts += [
+            f"{lead}{_where(each) if lead else ''}{each.evidence.rstrip('.?')}"
+            + ("?" if each.evidence.endswith("?") else ".")
+            for each in own
+        ]
     return texts
 
 
@@ -139,8 +143,9 @@ def headline(found: Inspected) -> str:
         more = f", {doubts} to be looked at" if doubts else ""
         return f"{faults} of {count} checks found a fault{more}: correct it before any fit."
     if doubts:
-        return f"Nothing is wrong for certain; {doubts} of {count} checks have a doubt."
-    return f"Nothing is wrong: {count} checks."
+        verb = "is" if doubts == 1 else "are"
+        return f"No faults; {doubts} of {count} checks {verb} doubtful."
+    return f"No faults and no doubts: {count} checks."
 
 
 def counted(found: Inspected) -> tuple[int, int, int]:

@@ -9,7 +9,7 @@ from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
 from excite_cli.summary.pairs import pairs_data, pairs_in_words, worst_data
 
-_CAPTION = "A margin is what is left beyond what the config asks to keep."
+_CAPTION = "Margins are distances to the limit, beyond any safety margin that the config requires."
 
 
 def check_answer(found: Inspections, file: str, problem: Problem) -> Answer:
@@ -68,9 +68,9 @@ def _agreement(found: Inspections) -> list[str]:
         of = [each for each in paths if each.name == name]
         most = max(of, key=lambda each: each.difference)
         lines.append(
-            f"{name}: margin by Pinocchio and coal at {sum(each.instants for each in of)} of "
-            f"{sum(each.of for each in of)} instants, the lowest among them; the program's own "
-            f"differs by at most {most.difference:.1g} {most.unit}."
+            f"{name}: recomputed with Pinocchio and coal at {sum(each.instants for each in of)} of "
+            f"{sum(each.of for each in of)} instants, those of lowest margin among them; largest "
+            f"difference {most.difference:.1g} {most.unit}."
         )
     return lines
 

@@ -35,7 +35,7 @@ def load_parts(found: LoadIdentification) -> Parts:
         _in_words(found),
         Table(title, ("parameter", "value", "unit"), rows, left=("parameter", "unit")),
         Table(
-            "Error of the torque where the joint moves, of these data",
+            "Torque error on these data, where the joint moves",
             ("joint", "fit without the load", "with it"),
             errors,
             left=("joint",),
@@ -49,7 +49,7 @@ def _in_words(found: LoadIdentification) -> str:
     centre = ", ".join(with_deviation(1e3 * p.value, 1e3 * p.std) for p in _centre(found))
     doubt = "" if found.possible else " These values are physically infeasible."
     if any(each.kind == "more_than_a_load" for each in found.findings):
-        doubt += " But these data hold more than a payload, which the ± do not cover."
+        doubt += " The data contain more than a rigid payload, which the ± do not cover."
     return (
         f"{found.link} carries {with_deviation(mass.value, mass.std)} kg with its centre at "
         f"({centre}) mm, from {found.seconds:.3g} s of motion.{doubt}"

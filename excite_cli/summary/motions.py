@@ -101,8 +101,9 @@ def result_parts(result: Result) -> Parts:
 def invariants_in_words(found: Invariants) -> str:
     """Figures that are the same whichever columns are called base parameters."""
     words = (
-        f"Predicted-torque standard deviation: {found.torque_deviation:.2g} σ of one sample (RMS "
-        "over random states within the limits, independent of the choice of base parameters)"
+        f"Standard deviation of the predicted torque: {found.torque_deviation:.2g} times that of "
+        "the torque noise (RMS over random states within the limits; it does not depend on the "
+        "choice of base parameters)"
     )
     if found.efficiency is None or found.slack is None:
         return f"{words}."
@@ -122,6 +123,9 @@ def invariants_data(found: Invariants) -> dict[str, Any]:
     }
 
 
+_FINE = "stacked, finely sampled"
+
+
 def motion_table(motions: Sequence[Motion]) -> Table:
     """Condition numbers of each motion and of the stack (the paper's Table I), status, effort."""
     rows = tuple(
@@ -136,7 +140,7 @@ def motion_table(motions: Sequence[Motion]) -> Table:
         )
         for motion in motions
     )
-    names = ("motion", "own", "stacked", "dense", "status", "iterations", "seconds")
+    names = ("motion", "own", "stacked", _FINE, "status", "iterations", "planning [s]")
     return Table("Condition numbers", names, rows, left=("status",))
 
 
@@ -155,26 +159,27 @@ def margin_table(motions: Sequence[Motion]) -> Table:
         rows.append((name, *figures, f"{worst.time:.3f}"))
     names = ("constraint", "margin", "unit", "where", "motion", "time [s]")
     left, words = ("constraint", "unit"), ("where",)
-    return Table("Worst margins at 1 kHz", names, tuple(rows), left, words)
+    return Table("Worst margins, sampled at 1 kHz", names, tuple(rows), left, words)
 
 
 def outlook_table(outlook: dict[str, Any]) -> Table:
     """What the motions are expected to tell apart."""
-    title = f"Expected divergence ½Δ; from {outlook['distinguished_from']:g} on, distinguished"
-    names = ("effect", "indistinguishable from", "so far", "then", "motions needed")
+    least = outlook["distinguished_from"]
+    title = f"Kullback-Leibler divergence of effects [nats]; from {least:g} on, distinguished"
+    names = ("effect", "or", "measured data", "with this motion", "motions needed")
     rows = []
     for pair in outlook["pairs"]:
         needed = pair["motions_needed"]
         figures = (f"{pair['kl_so_far']:.2g}", f"{pair['expected_kl']:.3g}")
         count = "> 1000" if needed is None else str(needed)
         rows.append((pair["effect"], pair["alias"], *figures, count))
-    return Table(title, names, tuple(rows), words=("effect", "indistinguishable from"))
+    return Table(title, names, tuple(rows), words=("effect", "or"))
 
 
 def motion_sentence(motion: Motion) -> str:
     """What is worth saying once a motion is done."""
     note = "" if motion.improved else "; it brings no improvement"
-    note += "; raise optimizer.max_seconds" if motion.status is Status.TIME_LIMIT else ""
+    note += " of optimizer.max_seconds per start" if motion.status is Status.TIME_LIMIT else ""
     note += f"; {motion.note}" if motion.note else ""
     if flattered(motion.stacked_condition_number, motion.dense_condition_number):
         note += f"; {_dense(motion)} between its samples: take more of sampling.cost"
@@ -292,7 +297,9 @@ def _table(found: Comparison) -> Table:
         )
         rows.append((str(index + 1), *_pair(first), *_pair(second), ratio))
     title = "Condition numbers, optimised and random (the paper's Tables I, II)"
-    names = ("motion", "optimised", "stacked", "random", "random, stacked", "times worse")
+    names = (
+        "motion", "optimised", "optimised, stacked", "random", "random, stacked", "stacked ratio",
+    )  # fmt: skip
     return Table(title, names, tuple(rows))
 
 

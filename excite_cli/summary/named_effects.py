@@ -1,4 +1,4 @@
-"""Tables of the effects that a diagnosis named, and what each indistinguishable from."""
+"""Tables of the effects that a diagnosis named, and what each is indistinguishable from."""
 
 from collections.abc import Sequence
 from math import nan
@@ -77,10 +77,11 @@ def friction_table(lines: Sequence[FrictionLine]) -> Table:
 
 
 _SIZE = "size ± std"
+_WITHOUT_IT = "held-out, without it"
 
 
 def effect_parts(found: Diagnosis, verbose: bool) -> Parts:
-    """The named effects, small ones in one line, and what each indistinguishable from."""
+    """The named effects, small ones in one line, and what each is indistinguishable from."""
     everything = len(found.joint_names)
     curves, own = ([], set()) if verbose else friction_rows(found)
     named = [each for each in found.named if not _is_part(each, own)]
@@ -89,7 +90,7 @@ def effect_parts(found: Diagnosis, verbose: bool) -> Parts:
         shown, small = [*shown, *small], []
     parts: Parts = [effect_table(shown, everything, verbose)] if shown else []
     if small:
-        listed = ", ".join(
+        listed = "; ".join(
             what_and_where(each.effect, everything)
             + f" ({each.verdict})" * (each.verdict is HeldOutVerdict.NOT_CONFIRMED)
             for each in small
@@ -128,20 +129,21 @@ def effect_table(shown: Sequence[NamedEffect], everything: int, verbose: bool) -
         for named in shown
     )
     return Table(
-        "What the declared model lacks (reduction: Shapley share of the error reduction)",
-        ("effect", "where", _SIZE, *(["p"] if verbose else []), "reduction", "held-out"),
+        "What the declared model lacks (share: part of the fall of the mean error of all joints; "
+        "the last column: verdict on held-out data, error of the most affected joint without it)",
+        ("effect", "where", _SIZE, *(["p"] if verbose else []), "share", _WITHOUT_IT),
         rows,
         left=("effect",),
-        words=("where", _SIZE, "held-out"),
+        words=("where", _SIZE, _WITHOUT_IT),
     )
 
 
 def other_names(named: NamedEffect, everything: int) -> list[str]:
-    """What it indistinguishable from: by these data, and by any."""
+    """What it is indistinguishable from: by these data, and by any."""
     what, found = what_and_where(named.effect, everything), []
     if named.aliases:
         others = ", ".join(what_and_where(alias, everything) for alias in named.aliases)
-        found.append(f"{what} indistinguishable from: {others}")
+        found.append(f"{what} is indistinguishable from: {others}")
     if same := other_name_of(named.effect.kind):
         found.append(f"{what} produces the same torque as {' and '.join(same)}")
     return found
@@ -149,12 +151,12 @@ def other_names(named: NamedEffect, everything: int) -> list[str]:
 
 def _joint_alias(alias: JointAlias, everything: int) -> str:
     named, others = (
-        " with ".join(what_and_where(one, everything) for one in side)
+        " + ".join(what_and_where(one, everything) for one in side)
         for side in (alias.named, alias.others)
     )
     if alias.same_torque:
-        return f"{named} is the same torque as {others}: no motion distinguishes them"
-    return f"{named} indistinguishable from: {others}"
+        return f"{named} produce the same torque as {others}: no motion distinguishes them"
+    return f"{named} are indistinguishable from: {others}"
 
 
 def what_and_where(record: EffectRecord, everything: int) -> str:
@@ -172,12 +174,12 @@ def approximation_parts(found: Diagnosis, verbose: bool) -> Parts:
     shown = [each for each in every if verbose or each.verdict is HeldOutVerdict.CONFIRMED]
     parts: Parts = [_approximation_table(shown, everything)] if shown else []
     if others := [each for each in every if each not in shown]:
-        listed = ", ".join(
+        listed = "; ".join(
             what_and_where(each.effect, everything)
             + f" ({each.verdict})" * (each.verdict is HeldOutVerdict.HARMFUL)
             for each in others
         )
-        parts.append(f"In the model, but not confirmed: {listed} (--verbose: sizes, and why not)")
+        parts.append(f"Surrogate terms that are not confirmed: {listed} (--verbose: sizes)")
     return parts
 
 
@@ -194,9 +196,9 @@ def _approximation_table(shown: Sequence[NamedEffect], everything: int) -> Table
         for each in shown
     )
     return Table(
-        "Surrogate terms (true form unknown)",
-        ("effect", "where", _SIZE, "reduction", "held-out", "likely true form"),
+        "Surrogate terms (they approximate an effect that has no name)",
+        ("effect", "where", _SIZE, "share", _WITHOUT_IT, "true form"),
         rows,
         left=("effect",),
-        words=("where", _SIZE, "held-out", "likely true form"),
+        words=("where", _SIZE, _WITHOUT_IT, "true form"),
     )

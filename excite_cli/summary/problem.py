@@ -59,7 +59,7 @@ def problem_notes(problem: Problem) -> Iterator[Note]:
     robot = problem.robot
     criterion, weighting = problem.spec.criterion, problem.weighting
     extra = len(problem.extension.names)
-    effects = f" and {extra} columns of effects" if extra else ""
+    effects = f" and {extra} effect column{'s' * (extra > 1)}" if extra else ""
     yield _said(
         f"{robot.name}: {robot.n} joints, {problem.base.rank} {_of(problem)}{effects}, "
         f"{problem.variables} variables; criterion: {criterion.kind}"
@@ -176,7 +176,7 @@ def _effects(problem: Problem) -> Iterator[Note]:
             "the size of the median inertial column"
         )
     for reason in extension.left_out:
-        yield _said(f"left out of the regressor: {reason}")
+        yield _said(f"no column of its own in the regressor: {reason}")
     if extension.fine:
         yield _detail("cost samples are those of the constraints: an effect needs time derivatives")
     if spec.effects is None and declared_effects(None, problem.robot):

@@ -12,7 +12,11 @@ def robots_answer(found: Sequence[Glance], names: Sequence[str]) -> Answer:
     """What `excite robots` answers; `names` are all short names, aliases included."""
     rows = []
     for each in found:
-        there = {"inertias": each.inertias, "visuals": each.visual, "collisions": each.collision}
+        there = {
+            "inertias": each.inertias,
+            "visual geometry": each.visual,
+            "collision geometry": each.collision,
+        }
         lacks = ", ".join(word for word, is_there in there.items() if not is_there)
         rows.append((each.name, each.kind, str(each.joints), lacks, ", ".join(each.others)))
     columns = ("name", "kind", "joints", "lacks", "also called")
@@ -73,7 +77,7 @@ def robot_parts(found: DescribedRobot) -> Parts:
     )
     left = ("joint", *(("kind",) * sliding))
     table = Table(f"{_in_words(found)} ({unit})", names, rows, left, ("links",))
-    return [table, f"fixed to the base: {', '.join(found.base_links)}"]
+    return [table, f"links fixed to the world: {', '.join(found.base_links)}"]
 
 
 def _limits(joint: DescribedJoint) -> list[str]:

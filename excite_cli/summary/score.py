@@ -4,6 +4,7 @@ from math import isfinite, isnan
 from typing import Any
 
 from excite_cli.diagnosis.words import place_in_words, title_of, value_in_words
+from excite_cli.identification.fit_words import short_number
 from excite_cli.scoring.records import Reason, Score, ScoredRun
 from excite_cli.scoring.thresholds import Thresholds
 from excite_cli.shown.answer import Answer, Parts, Table
@@ -49,10 +50,10 @@ def sentences(found: Score) -> list[str]:
     mean = percent(found.error.mean_relative_moving)
     made = ""
     if found.made is not None:
-        made = f"; it was {percent(found.made.mean_relative_moving)} when it was made"
+        made = f"; {percent(found.made.mean_relative_moving)} when the model was made"
+    runs = f"{len(found.runs)} run{'s' * (len(found.runs) > 1)}"
     first = (
-        f"{found.model} predicts the torque of {len(found.runs)} "
-        f"run{'s' * (len(found.runs) > 1)} to {mean} where joints move (mean over joints{made})."
+        f"{found.model}: torque error {mean} on {runs}, where joints move (mean over joints{made})."
     )
     if found.made is None:
         return [first]
@@ -64,7 +65,8 @@ def sentences(found: Score) -> list[str]:
         told.append(f"and {more} more: see the table")
     count = f"{len(found.alarms)} of {len(found.runs)}"
     alarm = f"{count} runs exceed the model's tolerance. {'. '.join(told)}."
-    return [alarm, first, *_not_judged(found)]
+    after = "Next: diagnose these data with the model's config (excite diagnose CONFIG DATA)."
+    return [alarm, first, *_not_judged(found), after]
 
 
 def _not_judged(found: Score) -> list[str]:
@@ -86,20 +88,20 @@ def in_words(run: ScoredRun, found: Score) -> str:
     beyond = _beyond(run)
     if not run.reasons:
         return f"{beyond}; nothing that changes from day to day explains it"
-    return f"{' and '.join(_reason(each, found) for each in run.reasons)} ({beyond})"
+    return f"{beyond}: {' and '.join(_reason(each, found) for each in run.reasons)}"
 
 
 def _beyond(run: ScoredRun) -> str:
     worst = max(run.left, key=lambda joint: max(run.ratio[joint], run.peak[joint] / 2.5))
-    return f"{run.ratio[worst]:.2g} times the tolerance on {worst}"
+    return f"{short_number(run.ratio[worst], 2)} times the tolerance on {worst}"
 
 
 def _reason(reason: Reason, found: Score) -> str:
     place = place_in_words(reason.effect, len(found.joint_names))
-    told = [
-        value_in_words(name, each) for name, each in reason.parameters.items() if name[0] != "I"
-    ][:4]
-    return f"{title_of(reason.effect.kind)}{place and ' at ' + place}, {', '.join(told)}"
+    name, value = next(iter(reason.parameters.items()))
+    return (
+        f"{title_of(reason.effect.kind)}{place and ' at ' + place}, {value_in_words(name, value)}"
+    )
 
 
 def runs_table(found: Score) -> Table:
@@ -112,13 +114,13 @@ def runs_table(found: Score) -> Table:
             percent(run.error.mean_relative),
             _worst(run),
             "ALARM" if run.alarm else "" if run.judged or found.made is None else "not judged",
-            in_words(run, found) if run.alarm else "",
+            ", ".join(title_of(each.effect.kind) for each in run.reasons) if run.alarm else "",
         )
         for run in found.runs
     )
     return Table(
-        "Runs: error of the torque against the model's tolerance",
-        ("run", "seconds", "where moving", "all samples", "ratio", "state", "likely reason"),
+        "Runs: torque error, and its part beyond friction as a multiple of what the model leaves",
+        ("run", "seconds", "error, moving", "error, all", "multiple", "state", "likely reason"),
         rows,
         left=("run", "state"),
         words=("likely reason",),
@@ -149,8 +151,17 @@ def joints_table(found: Score) -> Table:
         if not isnan(found.error.rms[joint])  # its torque was not measured
     )
     return Table(
-        "Joints: error over all runs, and when the model was made",
-        ("joint", "where moving", "then", "RMS", "RMS then", "noise", "unit", "worst run"),
+        "Joints: torque error over all runs, and when the model was made",
+        (
+            "joint",
+            "error, moving",
+            "when made",
+            "RMS, all",
+            "RMS when made",
+            "noise",
+            "unit",
+            "worst run",
+        ),
         rows,
         left=("joint", "unit", "worst run"),
     )

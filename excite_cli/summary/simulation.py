@@ -47,11 +47,11 @@ def _replay_in_words(found: Replay) -> str:
     all_slide = set(found.after) <= set(found.sliding)
     unit = "mm" if all_slide else "mrad (mm)" if found.sliding else "mrad"
     if before is None:
-        return f"Played with {over}, {found.model} deviates by {1e3 * after:.3g} {unit}.{lost}"
-    verb = "instead of" if found.good else "and no less than"
+        return f"Driven by {over}, the model deviates by {1e3 * after:.3g} {unit} RMS.{lost}"
+    worse = "" if found.good else ", which is no improvement"
     return (
-        f"Played with {over}, {found.model} deviates from the robot by {1e3 * after:.3g} {unit} "
-        f"{verb} the URDF's {1e3 * before:.3g} (mean over joints).{lost}"
+        f"Driven by {over}, the model deviates from the robot by {1e3 * after:.3g} {unit} RMS "
+        f"(URDF: {1e3 * before:.3g} {unit}; mean over joints){worse}.{lost}"
     )
 
 
@@ -126,16 +126,16 @@ def _run_table(found: Simulation) -> Table:
                 names[worst],
             )
         )
-    tracking = [f"tracking [{unit}]" for unit, _ in kinds]
-    columns = ("run", "samples", "seconds", *tracking, "worst", "joint")
-    return Table("Runs (tracking: RMS)", columns, tuple(rows), left=("run", "joint"))
+    tracking = [f"RMS over joints [{unit}]" for unit, _ in kinds]
+    columns = ("run", "samples", "seconds", *tracking, "worst joint's RMS", "joint")
+    return Table("Runs (tracking error)", columns, tuple(rows), left=("run", "joint"))
 
 
 def _effect_table(records: list[dict[str, Any]]) -> Table:
     rows = []
     for record in records:
         values = (
-            f"{name} {each['value']:.4g} {'' if each['unit'] == '1' else each['unit']}".strip()
+            f"{name} {each['value'] + 0.0:.4g}" + f" {each['unit']}" * (each["unit"] != "1")
             for name, each in record["parameters"].items()
         )
         rows.append(
@@ -149,9 +149,9 @@ def _effect_table(records: list[dict[str, Any]]) -> Table:
         )
     return Table(
         "Effects in the robot",
-        ("effect", "joints", "parameters", "runs", "declared"),
+        ("effect", "joints", "parameters", "runs", "in the config"),
         tuple(rows),
-        left=("effect", "declared"),
+        left=("effect", "in the config"),
         words=("joints", "parameters", "runs"),
     )
 
