@@ -20,8 +20,6 @@ from tests.excitation.smoke import one_motion, smoke, task_of
 from tests.robot.random_robots import random_robot
 
 BRIEF = ("sampling={}", "optimizer.max_iterations=20")
-
-
 SPLINE = (
     "trajectory={family: bspline, duration: 6, control_points: 14, start: posture, "
     "end: {shoulder_pitch: -0.5, elbow: 1.5}}"

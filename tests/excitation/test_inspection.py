@@ -94,8 +94,6 @@ def test_a_wrong_distance_of_our_own_is_found(
 
 
 CLEAR = np.array([0.0, 0.6, 0.8, 0.0, 0.05])
-
-
 IN_CONTACT = np.array([0.87, -1.65, -2.39, -1.81, 0.07])
 
 
@@ -161,8 +159,6 @@ def test_inspection_counts_what_is_only_between(clear: Problem, meshes: MeshChec
 
 
 DATA = CONFIG.parents[1] / "data"
-
-
 HEAD = "robot: {urdf: smoke_arm.urdf, posture: {shoulder_pitch: 0.6, elbow: 0.8, slide: 0.05}"
 
 
