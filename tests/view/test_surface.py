@@ -1,6 +1,14 @@
+"""Surfaces, the rays that meet them, and the camera that looks at them."""
+
+import sys
+
 import numpy as np
 import pytest
 
+from excite_cli.errors import MissingExtraError
+from excite_cli.view.camera import fitted_camera
+from excite_cli.view.rays import Tracer, embree_part
+from excite_cli.view.studio import Lights
 from excite_cli.view.surface import (
     Triangles,
     ball_profile,
@@ -76,3 +84,91 @@ def test_turn_to(direction: list[float]) -> None:
     length = np.linalg.norm(direction)
     if length:
         np.testing.assert_allclose(turn[:, 2], np.array(direction) / length)
+
+
+POINTS = np.random.default_rng(1).uniform([-1, -0.3, 0], [0.4, 2, 1.5], (60, 3))
+
+
+@pytest.mark.parametrize("view", [(0.0, 0.0), (35.0, 18.0), (250.0, 80.0), (-70.0, -30.0)])
+@pytest.mark.parametrize("size", [(640, 480), (300, 900)])
+def test_everything_is_seen_and_fills_the_picture(
+    view: tuple[float, float], size: tuple[int, int]
+) -> None:
+    camera = fitted_camera(POINTS, size, *view, fill=0.9)
+    places = camera.project(POINTS)
+    spans = np.ptp(places, axis=0) / size
+    assert places.min() > 0
+    assert (places < size).all()
+    assert 0.85 < spans.max() <= 0.91
+    np.testing.assert_allclose(
+        (places.min(axis=0) + places.max(axis=0)) / 2, np.array(size) / 2, atol=0.02 * max(size)
+    )
+
+
+def test_rays_go_through_what_is_projected_there() -> None:
+    camera = fitted_camera(POINTS, (640, 480), 35, 18)
+    places = camera.project(POINTS)
+    towards = POINTS - camera.eye
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    np.testing.assert_allclose(camera.rays(places[:, 0], places[:, 1]), towards, atol=1e-12)
+
+
+def test_azimuth_and_elevation() -> None:
+    camera = fitted_camera(POINTS, (100, 100), 90, 0)
+    assert camera.eye[1] > 2.0  # from +y
+    low, high = camera.project(np.array([[0, 0, 0.0], [0, 0, 1.0]]))
+    assert high[1] < low[1]  # z is up
+    left, right = camera.project(np.array([[0.3, 0, 0.0], [-0.3, 0, 0.0]]))
+    assert left[0] < right[0]
+
+
+pytest.importorskip("embreex")
+BALL = smooth_surface(round_triangles(ball_profile(1.0, 0.0)))
+CUBE = smooth_surface(box_triangles(np.array([0.5, 0.5, 0.5]))).moved(
+    np.eye(3), np.array([0.0, 5.0, 0.0])
+)
+
+
+def test_first_hits() -> None:
+    tracer = Tracer([BALL, CUBE], first_part=7)
+    origins = np.array([[4.0, 0.3, 0.2], [4, 5, 0.1], [4, 9, 0], [-4, 0, 0]])
+    directions = np.array([[-1.0, 0, 0], [-1, 0, 0], [-1, 0, 0], [-1, 0, 0]])
+    hits = tracer.first_hits(origins, directions)
+    assert hits.part.tolist() == [7, 8, -1, -1]
+    across = np.sqrt(1 - 0.13)
+    np.testing.assert_allclose(hits.distance[:2], [4 - across, 3.5], atol=0.02)
+    assert np.isinf(hits.distance[2:]).all()
+    np.testing.assert_allclose(hits.normal[0], [across, 0.3, 0.2], atol=0.03)
+    np.testing.assert_allclose(hits.normal[1], [1, 0, 0], atol=1e-6)
+
+
+def test_normals_are_towards_the_eye_on_meshes_inside_out() -> None:
+    turned = type(CUBE)(CUBE.points, -CUBE.normals, CUBE.faces[:, ::-1])
+    hits = Tracer([turned]).first_hits(np.array([[4.0, 5, 0]]), np.array([[-1.0, 0, 0]]))
+    np.testing.assert_allclose(hits.normal, [[1, 0, 0]], atol=1e-6)
+
+
+def test_blocked() -> None:
+    origins = np.array([[0.0, 5, -3], [0, 5, 3], [0, 0, -3], [0, 8, 0]])
+    up = np.array([0.0, 0, 1])
+    assert Tracer([BALL, CUBE]).blocked(origins, up).tolist() == [True, False, True, False]
+
+
+def test_nothing_to_meet() -> None:
+    hits = Tracer([]).first_hits(np.zeros((2, 3)), np.tile([1.0, 0, 0], (2, 1)))
+    assert hits.part.tolist() == [-1, -1]
+    assert not Tracer([]).blocked(np.zeros((2, 3)), np.array([1.0, 0, 0])).any()
+
+
+def test_open_ground_is_fully_lit_and_nooks_are_not() -> None:
+    lights = Lights.beside(35.0, 6, 16)
+    up = np.array([[0.0, 0, 1]])
+    far, below = np.array([[90.0, 0, -1.01]]), np.array([[0.0, 0, -1.01]])
+    assert lights.on(far, up, [Tracer([BALL])], 1e-4) == pytest.approx(1.0)
+    assert lights.on(below, up, [Tracer([BALL])], 1e-4) < 0.3
+
+
+def test_a_missing_embree_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "embreex.rtcore_scene", None)
+    with pytest.raises(MissingExtraError, match=r"pip install 'excite-cli\[view\]'"):
+        embree_part("rtcore_scene")
