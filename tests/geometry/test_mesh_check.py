@@ -1,7 +1,5 @@
 """The true meshes along a motion, against coal asked for every pair at every instant."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -16,10 +14,9 @@ from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Array, Robot, build_robot
 from tests.geometry.mesh_cover import uncovered_links
 from tests.robot.coupled_robots import CLAW, coupled_robot
+from tests.robot.smoke_arm import ARM
 
 from .fitted_robots import capsules_of, robot_of
-
-ARM = Path(__file__).parents[2] / "data" / "smoke_arm.urdf"
 
 
 def arm() -> Robot:
@@ -70,11 +67,8 @@ def test_blocks_of_instants_make_no_difference(monkeypatch: pytest.MonkeyPatch) 
     check, q = MeshCheck(arm()), wave(arm(), 200)
     whole = check.least(q)
     monkeypatch.setattr("excite_cli.geometry.mesh_check._BLOCK", 37)
-    parts = check.least(q)
-    assert [(g.first, g.second, g.touching) for g in whole.near] == [
-        (g.first, g.second, g.touching) for g in parts.near
-    ]
-    for one, two in zip(whole.near, parts.near, strict=True):
+    for one, two in zip(whole.near, check.least(q).near, strict=True):
+        assert (one.first, one.second, one.touching) == (two.first, two.second, two.touching)
         assert one.distance == pytest.approx(two.distance, abs=2e-6)
 
 

@@ -1,14 +1,9 @@
-"""Surfaces, the rays that meet them, and the camera that looks at them."""
-
-import sys
+"""Surfaces, and the camera that looks at them."""
 
 import numpy as np
 import pytest
 
-from excite_cli.errors import MissingExtraError
 from excite_cli.view.camera import fitted_camera
-from excite_cli.view.rays import Tracer, embree_part
-from excite_cli.view.studio import Lights
 from excite_cli.view.surface import (
     Triangles,
     ball_profile,
@@ -53,17 +48,12 @@ def test_a_box_keeps_its_edges_sharp() -> None:
 
 
 def test_a_ball_is_smooth() -> None:
-    surface = smooth_surface(round_triangles(ball_profile(2.0, 0.0)))
-    radial = np.einsum("kx,kx->k", surface.points / 2.0, surface.normals)
-    assert radial.min() > 0.995
-    rim_points = 48 * 15 + 2
-    assert len(surface.points) == rim_points
-
-
-def test_small_detail_is_dropped() -> None:
-    fine = round_triangles(ball_profile(1.0, 0.0))
-    coarse = smooth_surface(fine, cell=0.3)
-    assert len(coarse.faces) < len(fine.faces) / 3
+    ball = round_triangles(ball_profile(1.0, 0.0))
+    surface = smooth_surface(ball)
+    assert np.einsum("kx,kx->k", surface.points, surface.normals).min() > 0.995
+    assert len(surface.points) == 48 * 15 + 2
+    coarse = smooth_surface(ball, cell=0.3)
+    assert len(coarse.faces) < len(ball.faces) / 3, "small detail is dropped"
     assert np.linalg.norm(coarse.points, axis=1).min() > 0.85
 
 
@@ -105,70 +95,13 @@ def test_everything_is_seen_and_fills_the_picture(
     )
 
 
-def test_rays_go_through_what_is_projected_there() -> None:
-    camera = fitted_camera(POINTS, (640, 480), 35, 18)
-    places = camera.project(POINTS)
-    towards = POINTS - camera.eye
-    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
-    np.testing.assert_allclose(camera.rays(places[:, 0], places[:, 1]), towards, atol=1e-12)
-
-
-def test_azimuth_and_elevation() -> None:
+def test_azimuth_elevation_and_rays() -> None:
     camera = fitted_camera(POINTS, (100, 100), 90, 0)
     assert camera.eye[1] > 2.0  # from +y
     low, high = camera.project(np.array([[0, 0, 0.0], [0, 0, 1.0]]))
     assert high[1] < low[1]  # z is up
     left, right = camera.project(np.array([[0.3, 0, 0.0], [-0.3, 0, 0.0]]))
     assert left[0] < right[0]
-
-
-pytest.importorskip("embreex")
-BALL = smooth_surface(round_triangles(ball_profile(1.0, 0.0)))
-CUBE = smooth_surface(box_triangles(np.array([0.5, 0.5, 0.5]))).moved(
-    np.eye(3), np.array([0.0, 5.0, 0.0])
-)
-
-
-def test_first_hits() -> None:
-    tracer = Tracer([BALL, CUBE], first_part=7)
-    origins = np.array([[4.0, 0.3, 0.2], [4, 5, 0.1], [4, 9, 0], [-4, 0, 0]])
-    directions = np.array([[-1.0, 0, 0], [-1, 0, 0], [-1, 0, 0], [-1, 0, 0]])
-    hits = tracer.first_hits(origins, directions)
-    assert hits.part.tolist() == [7, 8, -1, -1]
-    across = np.sqrt(1 - 0.13)
-    np.testing.assert_allclose(hits.distance[:2], [4 - across, 3.5], atol=0.02)
-    assert np.isinf(hits.distance[2:]).all()
-    np.testing.assert_allclose(hits.normal[0], [across, 0.3, 0.2], atol=0.03)
-    np.testing.assert_allclose(hits.normal[1], [1, 0, 0], atol=1e-6)
-
-
-def test_normals_are_towards_the_eye_on_meshes_inside_out() -> None:
-    turned = type(CUBE)(CUBE.points, -CUBE.normals, CUBE.faces[:, ::-1])
-    hits = Tracer([turned]).first_hits(np.array([[4.0, 5, 0]]), np.array([[-1.0, 0, 0]]))
-    np.testing.assert_allclose(hits.normal, [[1, 0, 0]], atol=1e-6)
-
-
-def test_blocked() -> None:
-    origins = np.array([[0.0, 5, -3], [0, 5, 3], [0, 0, -3], [0, 8, 0]])
-    up = np.array([0.0, 0, 1])
-    assert Tracer([BALL, CUBE]).blocked(origins, up).tolist() == [True, False, True, False]
-
-
-def test_nothing_to_meet() -> None:
-    hits = Tracer([]).first_hits(np.zeros((2, 3)), np.tile([1.0, 0, 0], (2, 1)))
-    assert hits.part.tolist() == [-1, -1]
-    assert not Tracer([]).blocked(np.zeros((2, 3)), np.array([1.0, 0, 0])).any()
-
-
-def test_open_ground_is_fully_lit_and_nooks_are_not() -> None:
-    lights = Lights.beside(35.0, 6, 16)
-    up = np.array([[0.0, 0, 1]])
-    far, below = np.array([[90.0, 0, -1.01]]), np.array([[0.0, 0, -1.01]])
-    assert lights.on(far, up, [Tracer([BALL])], 1e-4) == pytest.approx(1.0)
-    assert lights.on(below, up, [Tracer([BALL])], 1e-4) < 0.3
-
-
-def test_a_missing_embree_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "embreex.rtcore_scene", None)
-    with pytest.raises(MissingExtraError, match=r"pip install 'excite-cli\[view\]'"):
-        embree_part("rtcore_scene")
+    places, towards = camera.project(POINTS), POINTS - camera.eye
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    np.testing.assert_allclose(camera.rays(places[:, 0], places[:, 1]), towards, atol=1e-12)
