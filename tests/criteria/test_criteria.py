@@ -66,13 +66,6 @@ def test_smooth_form_bounds_the_condition_number(seed: int, size: int, p: float)
     assert exact - 1e-12 <= smooth <= exact + 2 * np.log(size) / p + 1e-12
 
 
-def test_smooth_form_does_not_overflow() -> None:
-    sigma = np.array([1e150, 1.0, 1e-150])
-    criterion = SmoothConditionNumber(500.0)
-    assert criterion.value(sigma) == pytest.approx(np.log(1e300))
-    assert np.all(np.isfinite(criterion.derivative(sigma)))
-
-
 def test_continuation_ends_at_or_near_what_was_asked() -> None:
     for kind in CRITERIA:
         criterion = build_criterion(CriterionSpec(kind=kind, smoothing=32.0))
@@ -82,13 +75,15 @@ def test_continuation_ends_at_or_near_what_was_asked() -> None:
             assert steps[-1] == criterion or steps[-1] is criterion
 
 
-def test_scaling_the_regressor_leaves_the_condition_number() -> None:
+def test_smooth_forms_of_extreme_spectra() -> None:
+    """No overflow, no change with scale, and infinite where a parameter does not show."""
+    sigma = np.array([1e150, 1.0, 1e-150])
+    criterion = SmoothConditionNumber(500.0)
+    assert criterion.value(sigma) == pytest.approx(np.log(1e300))
+    assert np.all(np.isfinite(criterion.derivative(sigma)))
     sigma = _spectrum(5, 9)
     for criterion in (ConditionNumber(), SmoothConditionNumber(16.0)):
         assert criterion.value(7.0 * sigma) == pytest.approx(criterion.value(sigma))
-
-
-def test_a_parameter_that_does_not_show_makes_the_smooth_criterion_infinite() -> None:
     assert SmoothConditionNumber(4.0).value(np.array([2.0, 1.0, 0.0])) == np.inf
 
 

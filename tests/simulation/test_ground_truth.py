@@ -24,18 +24,35 @@ def robot() -> Robot:
 
 
 def test_a_local_kind_gives_one_effect_for_each_joint(robot: Robot) -> None:
+    """Of pairs and robots there is one."""
     both = parse_planted("coulomb_friction@elbow_joint, wrist_1_joint = 4", robot, RUNS)
     assert [p.effect.joints for p in both] == [(2,), (3,)]
     assert [p.values.tolist() for p in both] == [[4.0], [4.0]]
     assert len(parse_planted("viscous_friction@all=1", robot, RUNS)) == robot.n
-
-
-def test_pairs_and_robots_are_one(robot: Robot) -> None:
     (pair,) = parse_planted("coupled_friction@wrist_1_joint,wrist_2_joint=1", robot, RUNS)
     assert pair.effect.joints == (3, 4)
     (tilt,) = parse_planted("base_tilt@all=0.03,pitch:0.01", robot, RUNS)
     assert tilt.effect.joints == tuple(range(6))
     assert tilt.values.tolist() == [0.03, 0.01]
+
+
+@pytest.mark.parametrize(
+    ("text", "values", "shape"),
+    [
+        ("spring@elbow_joint=20,rest_position:0.5", [20.0, -10.0], {}),
+        ("payload@all=2,cz:0.1", [2.0, 0.0, 0.0, 0.2], {}),
+        # Levels and gaps are what is given first.
+        ("torque_saturation@elbow_joint=30,actuator:1", [1.0], {"level": 30.0}),
+        ("backlash@elbow_joint=0.01", [1.0], {"gap": 0.01}),
+    ],
+)
+def test_other_words_of_a_kind_are_understood(
+    robot: Robot, text: str, values: list[float], shape: dict[str, float]
+) -> None:
+    (found,) = parse_planted(text, robot, RUNS)
+    assert found.values[: len(values)] == pytest.approx(values)
+    assert found.effect.shape == shape
+    assert found.extra == ({"actuator": 1.0} if "actuator" in text else {})
 
 
 def test_named_numbers_runs_and_takes(robot: Robot) -> None:
@@ -46,22 +63,6 @@ def test_named_numbers_runs_and_takes(robot: Robot) -> None:
     assert friction.effect.runs == ("motion_1_take_1", "motion_1_take_2")
     (load,) = parse_planted("payload@all=1.5;runs:motion_2|motion_1_take_2", robot, RUNS)
     assert set(load.effect.runs) == {"motion_2", "motion_1_take_2"}
-
-
-def test_other_words_of_a_kind_are_understood(robot: Robot) -> None:
-    (spring,) = parse_planted("spring@elbow_joint=20,rest_position:0.5", robot, RUNS)
-    assert spring.values == pytest.approx(np.array([20.0, -10.0]))
-    (load,) = parse_planted("payload@all=2,cz:0.1", robot, RUNS)
-    assert load.values[3] == pytest.approx(0.2)
-
-
-def test_levels_and_gaps_are_what_is_given_first(robot: Robot) -> None:
-    (saturation,) = parse_planted("torque_saturation@elbow_joint=30,actuator:1", robot, RUNS)
-    assert saturation.effect.shape == {"level": 30.0}
-    assert saturation.values.tolist() == [1.0]
-    assert saturation.extra == {"actuator": 1.0}
-    (play,) = parse_planted("backlash@elbow_joint=0.01", robot, RUNS)
-    assert play.effect.shape == {"gap": 0.01}
 
 
 def test_a_record_says_everything_by_name(robot: Robot) -> None:

@@ -112,21 +112,15 @@ def test_fourier_is_equation_50() -> None:
     assert family.basis(np.array([t])).position @ alpha == pytest.approx(expected)
 
 
-def test_more_for_longer_motions_up_to_twelve() -> None:
+def test_harmonics_grow_with_time_and_fall_with_joints_and_small_accelerations() -> None:
     counts = [harmonics_for(duration, np.full(6, 10.0)) for duration in (1.0, 5.0, 8.0, 30.0)]
     assert counts == [5, 7, 12, 12]
-
-
-def test_fewer_where_accelerations_are_small() -> None:
+    counts = [harmonics_for(10.0, np.full(joints, 10.0)) for joints in (7, 14, 20, 30, 60)]
+    assert counts == [12, 12, 10, 7, 5]
     # At 0.5 rad/s² a motion of 0.05 rad can have 0.5 Hz: five harmonics of ten seconds.
     assert harmonics_for(12.0, np.full(6, 0.5)) == 6
     assert harmonics_for(12.0, np.array([0.5, 0.5, 0.5, 20.0, 20.0])) == 6
     assert harmonics_for(12.0, np.full(6, np.inf)) == 12
-
-
-def test_fewer_where_many_joints_move() -> None:
-    counts = [harmonics_for(10.0, np.full(joints, 10.0)) for joints in (7, 14, 20, 30, 60)]
-    assert counts == [12, 12, 10, 7, 5]
 
 
 def test_what_is_given_stays() -> None:
