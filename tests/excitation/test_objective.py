@@ -141,23 +141,18 @@ def test_weights_enter_value_and_gradient(rows: str | dict, columns: str) -> Non
     assert _error(objective, criterion, alpha) < 1e-7
 
 
-def test_stack_of_many_motions_is_that_of_all_rows_at_once() -> None:
+def test_stacks_are_those_of_all_rows_and_keep_small_singular_values() -> None:
     robot = random_robot(6, joints=3)
-    objective = _objective(robot, CriterionSpec(), False)
+    objective = _objective(robot, CriterionSpec(), prior=False)
+    rank = objective.base.rank
     blocks = [objective.block(_motion(robot, seed)) for seed in range(5)]
-    stack = Stack.empty(objective.base.rank)
+    stack = Stack.empty(rank)
     for block in blocks:
         stack = stack.with_rows(block)
     whole = np.vstack(blocks)
     assert stack.rows == len(whole)
     assert np.allclose(stack.factor.T @ stack.factor, whole.T @ whole)
     assert np.allclose(np.tril(stack.factor, -1), 0)
-
-
-def test_badly_conditioned_stack_keeps_its_small_singular_values() -> None:
-    robot = random_robot(6, joints=3)
-    objective = _objective(robot, CriterionSpec(), prior=False)
-    rank = objective.base.rank
     rng = np.random.default_rng(0)
     sigma = np.geomspace(1.0, 1e-9, rank)
     left = np.linalg.qr(rng.normal(size=(4 * rank, rank)))[0]

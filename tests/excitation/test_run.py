@@ -228,12 +228,9 @@ def test_default_grids_cover_the_trajectory_exactly(text: str) -> None:
     times = instants(spec.sampling.constraints)
     assert np.diff(times)[0] <= max(0.0201, trajectory.duration / 1000) or "step" in text
     assert len(instants(spec.sampling.cost)) >= min(30, trajectory.n_coefficients)
-
-
-def test_what_is_given_is_kept() -> None:
-    spec = _filled("sampling: {cost: {samples: 40, step: 0.2}, constraints: {samples: 400}}")
-    assert (spec.sampling.cost.samples, spec.sampling.cost.step) == (40, 0.2)
-    assert spec.sampling.constraints.step == pytest.approx(0.02, rel=1e-5)
+    given = _filled("sampling: {cost: {samples: 40, step: 0.2}, constraints: {samples: 400}}")
+    assert (given.sampling.cost.samples, given.sampling.cost.step) == (40, 0.2)
+    assert given.sampling.constraints.step == pytest.approx(0.02, rel=1e-5)
 
 
 @pytest.mark.parametrize(

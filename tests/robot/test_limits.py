@@ -37,6 +37,8 @@ from excite_cli.shown.note import Level
 from excite_cli.summary.problem import problem_notes
 from tests.proposal.robots import GOOD, joint, link, written
 from tests.robot.coupled_robots import CLAW, HAND, coupled_robot, urdf_of
+from tests.robot.formats.test_sdf import joint as sdf_joint
+from tests.robot.formats.test_sdf import link as sdf_link
 
 KINDS = {"revolute": "hinge", "prismatic": "slide"}
 
@@ -73,28 +75,13 @@ def mjcf(lower: float, upper: float, kind: str, more: str = "") -> str:
 
 
 def sdf(lower: float, upper: float, kind: str) -> str:
-    def link_of(name: str, height: float) -> str:
-        inertia = "".join(f"<{k}>0.01</{k}>" for k in ("ixx", "iyy", "izz"))
-        return (
-            f'<link name="{name}"><pose>0 0 {height} 0 0 0</pose><inertial><mass>1</mass>'
-            f"<inertia>{inertia}</inertia></inertial></link>"
-        )
-
-    def joint_of(name: str, type_: str, ends: tuple[str, str], low: float, high: float) -> str:
-        limit = f"<limit><lower>{low}</lower><upper>{high}</upper><effort>50</effort></limit>"
-        between = f"<parent>{ends[0]}</parent><child>{ends[1]}</child>"
-        return (
-            f'<joint name="{name}" type="{type_}">{between}'
-            f"<axis><xyz>0 1 0</xyz>{limit}</axis></joint>"
-        )
-
-    return (
-        '<sdf version="1.8"><model name="robot">'
-        + "".join(link_of(name, k * 0.25) for k, name in enumerate(("base", "upper", "tip")))
-        + joint_of("shoulder", "revolute", ("base", "upper"), -2, 2)
-        + joint_of("odd", kind, ("upper", "tip"), lower, upper)
-        + "</model></sdf>"
+    links = (
+        sdf_link(name, f"0 0 {k / 4} 0 0 0") for k, name in enumerate(("base", "upper", "tip"))
     )
+    odd = sdf_joint("odd", "upper", "tip", kind=kind).replace("<lower>-1<", f"<lower>{lower}<")
+    joints = sdf_joint("shoulder", "base", "upper") + odd.replace("<upper>2<", f"<upper>{upper}<")
+    inside = "".join(links) + joints
+    return f'<sdf version="1.8"><model name="robot">{inside}</model></sdf>'
 
 
 FORMATS = {
@@ -299,9 +286,8 @@ def claw(folder: Path, old: str = "", new: str = "", **spec: Any) -> Robot:
     """The claw with something else in its URDF."""
     text = urdf_of(CLAW)
     assert old in text
-    path = folder / "claw.urdf"
-    path.write_text(text.replace(old, new))
-    return build_robot(RobotSpec(urdf=str(path), **spec))
+    (folder / "claw.urdf").write_text(text.replace(old, new))
+    return build_robot(RobotSpec(urdf="claw.urdf", **spec), folder)
 
 
 def test_drivers_alone_are_moved_joints() -> None:
@@ -330,9 +316,13 @@ def test_chains_of_followers_end_at_the_driver() -> None:
     assert at["right_tip"] == pytest.approx(-0.9 * -0.5 + 0.05)
     data = robot.model.createData()
     pin.framesForwardKinematics(robot.model, data, robot.configurations(q[None])[0])
-    tip = data.oMf[robot.model.getFrameId("left_finger")].rotation
-    palm = data.oMf[robot.model.getFrameId("palm")].rotation
+    tip, palm = (
+        data.oMf[robot.model.getFrameId(name)].rotation for name in ("left_finger", "palm")
+    )
     np.testing.assert_allclose(tip, palm, atol=1e-12)  # the finger stays parallel
+    locked = coupled_robot(CLAW, joints=("shoulder", "wrist"), posture={"knuckle": 0.4})
+    assert locked.coupling is None
+    assert locked.locked["right_tip"] == pytest.approx(0.9 * 0.4 + 0.05)
 
 
 def test_followers_narrow_the_limits_of_their_driver(tmp_path: Path) -> None:
@@ -352,12 +342,6 @@ def test_followers_narrow_the_limits_of_their_driver(tmp_path: Path) -> None:
     robot = claw(tmp_path, 'lower="-0.9" upper="0.9" velocity="2"', 'velocity="0"')
     assert robot.limits.upper[2] == 0.8, "followers without limits do not narrow"
     assert robot.limits.velocity[2] == 2.0
-
-
-def test_a_follower_of_a_locked_driver_stands_where_that_leads_it() -> None:
-    robot = coupled_robot(CLAW, joints=("shoulder", "wrist"), posture={"knuckle": 0.4})
-    assert robot.coupling is None
-    assert robot.locked["right_tip"] == pytest.approx(0.9 * 0.4 + 0.05)
 
 
 def test_what_contradicts_the_driver_is_told(tmp_path: Path) -> None:
