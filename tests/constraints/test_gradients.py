@@ -43,7 +43,7 @@ def _all(balance: DiscSpec | PolygonSpec, collision: bool) -> ConstraintsSpec:
     )
 
 
-def _check(robot: Robot, constraint: Constraint, seed: int, tolerance: float) -> None:
+def check_gradients(robot: Robot, constraint: Constraint, seed: int, tolerance: float) -> None:
     kinematics = BatchKinematics(robot)
     q, v, a = robot.draw_states(3, seed)
     states = States(kinematics, q, v, a)
@@ -72,13 +72,13 @@ def test_gradients_on_random_robots(seed: int) -> None:
     robot = random_robot(seed, joints=4, floating=seed % 2 == 1)
     polygon = PolygonSpec(kind="polygon", vertices=((1, 1), (-1, 1), (-1, -1), (1, -1)))
     for constraint in build_constraints(_all(polygon, collision=False), robot):
-        _check(robot, constraint, seed, 1e-6)
+        check_gradients(robot, constraint, seed, 1e-6)
 
 
 def test_gradients_on_a_real_arm_with_capsules() -> None:
     robot = build_robot(RobotSpec(urdf="example-robot-data:panda"))
     for constraint in build_constraints(_all(DiscSpec(radius=0.3), collision=True), robot):
-        _check(robot, constraint, 1, 1e-5)
+        check_gradients(robot, constraint, 1, 1e-5)
 
 
 @pytest.mark.parametrize("uncertain", [False, True])
@@ -97,7 +97,7 @@ def test_gradients_where_joints_follow_others(parts: tuple, uncertain: bool) -> 
         constraint.name for constraint in found
     }
     for constraint in found:
-        _check(robot, constraint, 1, 1e-5)
+        check_gradients(robot, constraint, 1, 1e-5)
 
 
 def with_motors() -> Robot:
@@ -127,7 +127,7 @@ def test_motors_that_drive_several_joints_are_bounded(uncertain: bool) -> None:
     of_motors = ("motor_position", "motor_velocity", "motor_acceleration", "motor_torque")
     assert set(of_motors) < set(found)
     for name in of_motors:
-        _check(robot, found[name], 1, 1e-5)
+        check_gradients(robot, found[name], 1, 1e-5)
     assert found["motor_torque"].labels == ("m1 lower", "m2 lower", "m1 upper", "m2 upper")
     q, v, a = robot.draw_states(30, 1)
     states = States(BatchKinematics(robot), q, v, a)
@@ -150,15 +150,14 @@ def test_motors_that_drive_several_joints_are_bounded(uncertain: bool) -> None:
 @pytest.mark.parametrize("uncertain", [False, True])
 def test_bounds_of_motors_between_instants_hold_at_instants(uncertain: bool) -> None:
     robot = with_motors()
-    spec = ConstraintsSpec(joint_limits=JointLimitsSpec(), torque=TorqueSpec())
     family = FourierTrajectory(3, 1.5)
     drawn = np.random.default_rng(0).normal(size=(family.n_coefficients, robot.n))
     coefficients = drawn * [0.4, 0.4, 0.01]
     intervals = intervals_of(family, 0.02)
     motion = EnclosedMotion(robot, enclosed_states(family, coefficients, intervals))
-    for constraint in build_constraints(spec, robot, _known(robot, uncertain)):
-        if not constraint.name.startswith("motor"):
-            continue
+    spec = ConstraintsSpec(joint_limits=JointLimitsSpec(), torque=TorqueSpec())
+    found = build_constraints(spec, robot, _known(robot, uncertain))
+    for constraint in (each for each in found if each.name.startswith("motor")):
         least = constraint.least(motion)
         assert least is not None
         for s in (-1.0, -0.3, 0.0, 1.0):
@@ -172,15 +171,14 @@ def test_disc_margin_is_inside_the_circle() -> None:
     robot = random_robot(2, joints=4)
     spec = ConstraintsSpec(joint_limits=None, balance=DiscSpec(radius=0.05, center=(0.1, -0.2)))
     (disc,) = build_constraints(spec, robot)
-    q, v, a = robot.draw_states(200, 0)
-    margins = disc.margins(States(BatchKinematics(robot), q, v, a))
-    center = CenterOfMass(robot).position(States(BatchKinematics(robot), q, v, a))[:, :2]
+    states = States(BatchKinematics(robot), *robot.draw_states(200, 0))
+    margins = disc.margins(states).min(axis=1)
+    center = CenterOfMass(robot).position(states)[:, :2]
     radial = 0.05 - np.linalg.norm(center - [0.1, -0.2], axis=1)
-    admissible = margins.min(axis=1) >= 0
-    assert admissible.any()
-    assert np.all(radial[admissible] >= 0)
+    assert (margins >= 0).any()
+    assert np.all(radial[margins >= 0] >= 0)
     # The inscribed polygon of 16 sides gives away less than 2 % of the radius.
-    assert np.all(margins.min(axis=1)[radial > 0] >= radial[radial > 0] - 0.02 * 0.05)
+    assert np.all(margins[radial > 0] >= radial[radial > 0] - 0.02 * 0.05)
 
 
 def test_polygon_takes_vertices_in_any_order_and_its_margin() -> None:

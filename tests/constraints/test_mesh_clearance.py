@@ -9,7 +9,7 @@ from excite_cli.geometry.pair_table import PairTable
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.enclosed_trajectory import Intervals, enclosed_states, intervals_of
 from excite_cli.trajectory.fourier import FourierTrajectory
-from tests.constraints.test_gradients import _check as check_gradients
+from tests.constraints.test_gradients import check_gradients
 from tests.robot.random_robots import random_robot
 
 ROBOT = random_robot(2, joints=4)

@@ -13,7 +13,7 @@ from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.start import clear_posture
 from excite_cli.excitation.task import MotionTask
-from tests.constraints.test_gradients import _check as check_gradients
+from tests.constraints.test_gradients import check_gradients
 from tests.excitation.smoke import one_motion, smoke
 from tests.geometry.obstacle_worlds import coal_distances
 

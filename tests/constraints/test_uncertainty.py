@@ -29,7 +29,7 @@ from excite_cli.dynamics.whole_robot import drawn_states, whole_parameters
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.robot.model import Robot
-from tests.constraints.test_gradients import _check as check_gradients
+from tests.constraints.test_gradients import check_gradients
 from tests.dynamics.test_uncertain_inertias import SPEC, knowledge
 from tests.excitation.smoke import CONFIG, one_motion, smoke
 from tests.robot.random_robots import random_robot

@@ -247,21 +247,20 @@ def test_fits_that_cannot_be_followed_are_refused() -> None:
 
 
 def test_bodies_are_named_by_joint_link_or_base() -> None:
-    robot = random_robot(7, joints=3)
+    """Unknown and locked ones are told."""
     exact = BodyUncertaintySpec(mass=0.0, center_of_mass=0.0, inertia=0.0)
-    for names in (("base", "joint_2"), ("link_0", "link_2")):
+
+    def exact_ones(robot: Robot, *names: str) -> list[int]:
         reach = box(UncertaintySpec(bodies=dict.fromkeys(names, exact)), robot).reshape(-1, 10)
-        assert np.flatnonzero(reach.sum(axis=1)).tolist() == [1, 3]
-    floating = random_robot(7, joints=3, floating=True)
-    reach = box(UncertaintySpec(bodies={"base": exact}), floating).reshape(-1, 10)
-    assert np.flatnonzero(reach.sum(axis=1)).tolist() == [2, 3, 4]
+        return np.flatnonzero(reach.sum(axis=1)).tolist()
 
-
-def test_unknown_and_locked_bodies_are_told() -> None:
-    robot = build_robot(
-        RobotSpec(urdf="example-robot-data:ur10", joints=("elbow_joint", "wrist_1_joint"))
-    )
+    robot = random_robot(7, joints=3)
+    assert exact_ones(robot, "base", "joint_2") == [1, 3]
+    assert exact_ones(robot, "link_0", "link_2") == [1, 3]
+    assert exact_ones(random_robot(7, joints=3, floating=True), "base") == [2, 3, 4]
+    moved = ("elbow_joint", "wrist_1_joint")
+    arm = build_robot(RobotSpec(urdf="example-robot-data:ur10", joints=moved))
     with pytest.raises(ConfigError, match=r"no moved joint 'elbow_join'. Did you mean 'elbow_joi"):
-        box(UncertaintySpec(bodies={"elbow_join": BodyUncertaintySpec()}), robot)
+        exact_ones(arm, "elbow_join")
     with pytest.raises(ConfigError, match=r"'wrist_2_joint'. It is locked.* Bodies: base, elbow"):
-        box(UncertaintySpec(bodies={"wrist_2_joint": BodyUncertaintySpec()}), robot)
+        exact_ones(arm, "wrist_2_joint")

@@ -37,7 +37,9 @@ def problem() -> Problem:
     return smoke(AROUND)
 
 
-def _seen(problem: Problem, alpha: np.ndarray, check: MeshCheck | None = None, **look: float):
+def _seen(
+    problem: Problem, alpha: np.ndarray, check: MeshCheck | None = None, **look: float
+) -> Inspection:
     path = path_of(problem, problem.trajectory, alpha)
     return inspect(problem, path, check, Look(**look))
 

@@ -264,20 +264,17 @@ def test_without_effects_in_the_yaml_the_raw_form_is_untouched() -> None:
     np.testing.assert_array_equal(block, none.objective().block(alpha))
 
 
-def test_what_the_regressor_has_already_is_left_out_with_the_parameters_named() -> None:
-    problem = _problem("[{kind: armature, joints: [shoulder_yaw]}, {kind: viscous_friction}]")
-    (reason,) = problem.extension.left_out
+def test_what_no_motion_shows_is_left_out_with_the_reason() -> None:
+    """The regressor has it already, single runs have it, or nothing that is measured shows it."""
+    known = _problem("[{kind: armature, joints: [shoulder_yaw]}, {kind: viscous_friction}]")
+    (reason,) = known.extension.left_out
     assert reason.startswith("armature on shoulder_yaw: the regressor shows it already in")
     assert "Izz[shoulder_pitch]" in reason or "Izz[shoulder_yaw]" in reason
-    assert len(problem.extension.effects) == problem.robot.n
-    twice = _problem("[{kind: coulomb_friction, joints: [elbow]}, "
-                     "{kind: asymmetric_friction, joints: [elbow]}, "
-                     "{kind: torque_offset, joints: [elbow]}]")  # fmt: skip
-    assert any("asymmetric_friction on elbow" in r or "torque_offset on elbow" in r
-               for r in twice.extension.left_out)  # fmt: skip
-
-
-def test_effects_of_single_runs_and_without_columns_are_left_out() -> None:
+    assert len(known.extension.effects) == known.robot.n
+    kinds = ("coulomb_friction", "asymmetric_friction", "torque_offset")
+    twice = _problem(f"[{', '.join(f'{{kind: {kind}, joints: [elbow]}}' for kind in kinds)}]")
+    left = (f"{kind} on elbow" for kind in kinds[1:])
+    assert any(name in reason for name in left for reason in twice.extension.left_out)
     problem = _problem("[{kind: viscous_friction, joints: [elbow], runs: [a, b]}]")
     assert problem.extension.left_out == (
         "viscous_friction on elbow: it is present in recorded runs only (a, b)",
@@ -287,15 +284,12 @@ def test_effects_of_single_runs_and_without_columns_are_left_out() -> None:
             column = ", covariate: temp" if kind.follows_covariate else ""
             (reason, *_) = _problem(f"[{{kind: {name}{column}}}]").extension.left_out
             assert kind.why_not_excitable in reason
-
-
-def test_a_base_wrench_does_not_show_friction() -> None:
     robot = random_robot(12, joints=3, floating=True, rows=("base",))
     base = find_base_parameters(robot)
     weighting = build_weighting(CriterionSpec(), robot, base)
-    extension = extend(robot, base, weighting, [ViscousFriction((0,))], 6.0)
-    assert extension.names == ()
-    assert "none of its joints is a measured row" in extension.left_out[0]
+    of_base = extend(robot, base, weighting, [ViscousFriction((0,))], 6.0)
+    assert of_base.names == ()
+    assert "none of its joints is a measured row" in of_base.left_out[0]
 
 
 def test_time_derivatives_are_taken_on_the_fine_grid_with_the_same_weight() -> None:

@@ -308,3 +308,4 @@ def test_hull_points_keep_the_extremes_of_flat_clouds() -> None:
         assert (hull_points(flat) @ direction).max() == pytest.approx((flat @ direction).max())
     line = np.outer(np.linspace(0, 1, 9), [1.0, 2.0, 3.0])
     assert len(hull_points(line)) == 2
+    assert len(hull_points(np.ones((5, 3)))) == 1

@@ -1,5 +1,7 @@
 """The true meshes along a motion, against coal asked for every pair at every instant."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,6 @@ from excite_cli.geometry.mesh_check import MeshCheck
 from excite_cli.geometry.mesh_distances import MeshDistances
 from excite_cli.geometry.reasons import Standing
 from excite_cli.geometry.relative_reach import RelativeReach
-from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Array, Robot, build_robot
 from tests.geometry.mesh_cover import uncovered_links
 from tests.robot.coupled_robots import CLAW, coupled_robot
@@ -202,21 +203,18 @@ def test_contact_of_links_by_hand_and_at_the_posture_is_told_only() -> None:
 
 @pytest.mark.parametrize("name", ["ur10", "panda"])
 def test_capsules_contain_the_meshes(name: str) -> None:
-    assert not uncovered_links(robot_of(name), capsules_of(name))
-
-
-def test_a_capsule_that_is_too_small_is_found() -> None:
-    robot, capsules = robot_of("ur10"), list(capsules_of("ur10"))
+    """And what is too small is found."""
+    robot, capsules = robot_of(name), list(capsules_of(name))
+    assert not uncovered_links(robot, tuple(capsules))
+    if name == "panda":
+        return
     number = next(k for k, one in enumerate(capsules) if one.name == "forearm_link#2")
     one = capsules[number]
-    capsules[number] = Capsule(
-        one.name, one.joint, one.start, one.end, one.radius - 2e-4, one.links
-    )
+    capsules[number] = replace(one, radius=one.radius - 2e-4)
     found = uncovered_links(robot, tuple(capsules))
     assert [entry.link for entry in found] == ["forearm_link"]
     assert 5e-5 < found[0].distance < 3e-4
     del capsules[number]
-    found = uncovered_links(robot, tuple(capsules))
-    assert found[0].distance > 1e-3
+    assert uncovered_links(robot, tuple(capsules))[0].distance > 1e-3
     without = tuple(c for c in capsules if "forearm_link" not in c.links)
     assert uncovered_links(robot, without)[0].distance == np.inf

@@ -17,7 +17,7 @@ from excite_cli.geometry.pair_table import PairTable
 from excite_cli.geometry.pair_tables import FAR, mesh_tables, near_at_posture
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot, build_robot
-from tests.constraints.test_gradients import _check as check_gradients
+from tests.constraints.test_gradients import check_gradients
 
 
 def _link(name: str, shape: str, place: str = "0 0 0") -> str:

@@ -128,7 +128,7 @@ def test_the_readout(problem: Problem, segment: Segment) -> None:
     for track in instants.margins:
         assert track.name in margins
         assert f"{track.values[1]:.4g}" in margins
-        assert ("BROKEN" in margins) == any(t.values[1] < 0 for t in instants.margins)
+    assert ("BROKEN" in margins) == any(t.values[1] < 0 for t in instants.margins)
     assert instants.nearest is not None
     assert f"{1000 * instants.nearest.distances[1]:.1f} mm" in nearest_html(instants, 1)
     joints = joints_html(problem, instants, 1)

@@ -80,10 +80,8 @@ def test_meshes_are_scaled_and_placed(tmp_path: Path) -> None:
     corners = " ".join(f"{x} {y} {z}" for x in (0, 1) for y in (0, 2) for z in (0, 3))
     asset = f'<asset><mesh name="m" vertex="{corners}" scale="0.1 0.1 0.1"/></asset>'
     geom = '<geom type="mesh" mesh="m" pos="0.5 0 0" euler="0 0 90" mass="1"/>'
-    path = _written(
-        tmp_path, f'<body name="a"><joint name="j" range="-90 90"/>{geom}</body>', asset
-    )
-    robot = build_robot(RobotSpec(urdf=str(path)))
+    body = f'<body name="a"><joint name="j" range="-90 90"/>{geom}</body>'
+    robot = build_robot(RobotSpec(urdf=str(_written(tmp_path, body, asset))))
     (shape,) = link_shapes(robot, collision_model(robot))
     np.testing.assert_allclose(shape.points.min(axis=0), [0.3, 0.0, 0.0], atol=1e-6)
     np.testing.assert_allclose(shape.points.max(axis=0), [0.5, 0.1, 0.3], atol=1e-6)
