@@ -37,18 +37,23 @@ def converted(robot: Robot, run: Run, torques: bool = True, **given: object) -> 
     return found.runs[0]
 
 
-def load(robot: Robot, log: Swayed) -> Array:
-    return RigidBody(robot, standard_parameters(robot), log.q, log.v, log.a).load
-
-
 def test_base_and_joints_are_those_of_mujoco(robot: Robot, log: Swayed) -> None:
     run = converted(robot, log.run)
     assert run.q == pytest.approx(log.q, abs=1e-12)
     scale = np.abs(run.tau).max(axis=0)
-    assert np.abs(run.tau - load(robot, log)).max() / scale.max() < 1e-6
-    assert (np.abs(run.tau - load(robot, log)).max(axis=0) < 1e-5 * scale + 1e-5).all()
+    off = run.tau - RigidBody(robot, standard_parameters(robot), log.q, log.v, log.a).load
+    assert np.abs(off).max() / scale.max() < 1e-6
+    assert (np.abs(off).max(axis=0) < 1e-5 * scale + 1e-5).all()
     assert run.base_rows == 6
     assert run.usable().all()
+    extra = dict(log.run.extra)  # columns of their own are a channel
+    wrench = extra.pop("left_sole")
+    names = ("fx", "fy", "fz", "mx", "my", "mz")
+    extra |= {f"left_sole_{part}": wrench[:, k] for k, part in enumerate(names)}
+    apart = converted(robot, replace(log.run, extra=extra), torques=False)
+    assert np.array_equal(apart.tau[:, :6], run.tau[:, :6])
+    assert apart.usable()[:, :6].all(), "without torques only the base counts"
+    assert not apart.usable()[:, 6:].any()
 
 
 def test_a_force_plate_is_what_both_feet_are(robot: Robot, log: Swayed) -> None:
@@ -76,12 +81,6 @@ def _axes(angles: Array) -> Array:
     return np.column_stack([[0.0, 0.0, 1.0], about_y, about_x])
 
 
-def test_without_torques_only_the_base_counts(robot: Robot, log: Swayed) -> None:
-    run = converted(robot, log.run, torques=False)
-    assert run.usable()[:, :6].all()
-    assert not run.usable()[:, 6:].any()
-
-
 @pytest.mark.parametrize(
     ("given", "words"),
     [
@@ -91,30 +90,13 @@ def test_without_torques_only_the_base_counts(robot: Robot, log: Swayed) -> None
         ({"wrench": [{"channel": "gyroscope"}]}, r"'gyroscope' .* has the shape \(60, 3\); "
          r"expected is \(60, 6\): fx, fy, fz, mx, my, mz"),
         ({"base": {"pose": "gyroscope"}}, r"expected is \(60, 7\): x, y, z, qx, qy, qz, qw"),
+        ({"wrench": [{"channel": "gap"}]}, r"'gap' .* is not a number in 2 of 60 samples"),
+        ({"wrench": [{"channel": "left_sole", "link": "sole"}]},
+         r"measurement.wrench.link: the robot has no link 'sole'"),
     ],
 )  # fmt: skip
 def test_what_the_log_lacks_is_told(robot: Robot, log: Swayed, given: dict, words: str) -> None:
-    with pytest.raises(FileError, match=words):
-        converted(robot, log.run, **given)
-
-
-def test_columns_of_their_own_are_a_channel(robot: Robot, log: Swayed) -> None:
-    extra = dict(log.run.extra)
-    wrench = extra.pop("left_sole")
-    names = ("fx", "fy", "fz", "mx", "my", "mz")
-    extra |= {f"left_sole_{part}": wrench[:, k] for k, part in enumerate(names)}
-    apart = converted(robot, replace(log.run, extra=extra)).tau
-    assert np.array_equal(apart, converted(robot, log.run).tau)
-
-
-def test_a_gap_in_a_wrench_is_told(robot: Robot, log: Swayed) -> None:
-    extra = {name: values.copy() for name, values in log.run.extra.items()}
-    extra["right_sole"][3:5, 2] = np.nan
-    words = r"channel 'right_sole' .* is not a number in 2 of 60 samples"
-    with pytest.raises(FileError, match=words):
-        converted(robot, replace(log.run, extra=extra))
-
-
-def test_an_unknown_link_is_told(robot: Robot, log: Swayed) -> None:
-    with pytest.raises(ConfigError, match=r"measurement.wrench.link: the robot has no link 'sole'"):
-        converted(robot, log.run, wrench=[{"channel": "left_sole", "link": "sole"}])
+    gap = log.run.extra["right_sole"].copy()
+    gap[3:5, 2] = np.nan
+    with pytest.raises((ConfigError, FileError), match=words):
+        converted(robot, replace(log.run, extra={**log.run.extra, "gap": gap}), **given)

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from excite_cli.base_link.rows import with_base
-from excite_cli.base_link.state import base_state
+from excite_cli.base_link.state import base_state, denoised
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.config.wrench_spec import BaseStateSpec
 from excite_cli.errors import ConfigError, FileError
@@ -78,18 +78,14 @@ def test_gravity_from_elsewhere_is_a_base_that_leans(robot: Robot, log: Swayed) 
     assert "leans by 3.0°" in told[0].text
 
 
-def test_a_base_of_which_nothing_is_said_stands(robot: Robot, log: Swayed) -> None:
-    found = base_state(robot, log.run, BaseStateSpec())
-    assert not found.q.any()
-    assert found.lean is None
-
-
 def test_a_pose_may_be_of_any_origin(robot: Robot, log: Swayed) -> None:
-    moved = dict(log.run.extra)
-    moved["pose"] = moved["pose"] + [5.0, -3.0, 1.0, 0, 0, 0, 0]
-    spec = BaseStateSpec(pose="pose")
-    found = base_state(robot, replace(log.run, extra=moved), spec).q
+    """A base of which nothing is said stands."""
+    moved = {"pose": log.run.extra["pose"] + [5.0, -3.0, 1.0, 0, 0, 0, 0]}
+    found = base_state(robot, replace(log.run, extra=moved), BaseStateSpec(pose="pose")).q
     assert found == pytest.approx(log.q[:, :6], abs=1e-9)
+    still = base_state(robot, log.run, BaseStateSpec())
+    assert not still.q.any()
+    assert still.lean is None
 
 
 def test_a_base_on_its_side_has_axes_of_its_own(tmp_path: Path, log: Swayed) -> None:
@@ -107,12 +103,45 @@ def test_a_base_on_its_side_has_axes_of_its_own(tmp_path: Path, log: Swayed) -> 
         base_state(lying, log.run, BaseStateSpec(pose="pose"))
 
 
-def test_a_unit_on_an_arm_is_refused(robot: Robot, log: Swayed) -> None:
+PERIOD = 0.002
+NOISE = 0.02
+
+
+def motion(rng: np.random.Generator, seconds: float = 30.0) -> Array:
+    """Accelerations (T, 3) of a few frequencies below 1.5 Hz, of the size of the noise."""
+    t = np.arange(0.0, seconds, PERIOD)
+    waves = [np.sin(2 * np.pi * f * t[:, None] + rng.uniform(0, 6, 3)) for f in (0.3, 0.7, 1.3)]
+    return np.asarray(0.01 * sum(waves) + rng.uniform(-1, 1, 3))
+
+
+def slopes(y: Array, x: Array) -> Array:
+    y, x = y - y.mean(axis=0), x - x.mean(axis=0)
+    return np.asarray((x * y).sum(axis=0) / np.square(x).sum(axis=0))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_sizes_fitted_to_the_estimate_are_not_too_small(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    truth = motion(rng)
+    seen = truth + NOISE * rng.normal(size=truth.shape)
+    found = denoised(seen, PERIOD)
+    assert (slopes(truth, seen) < 0.7).all()  # what noise does to a size
+    # Noise stays within half a hertz of what moves: 2/250 of it, 2 % of the signal's energy.
+    assert slopes(truth, found) == pytest.approx(np.ones(3), abs=0.04)
+    assert found.mean(axis=0) == pytest.approx(seen.mean(axis=0))
+
+
+def test_a_clean_signal_stays_and_noise_becomes_little() -> None:
+    truth = motion(np.random.default_rng(3))
+    assert np.abs(denoised(truth, PERIOD) - truth).max() < 1e-4
+    noise = NOISE * np.random.default_rng(4).normal(size=(15000, 6))
+    assert denoised(noise, PERIOD).std() < 0.1 * NOISE
+    assert np.isfinite(denoised(noise[:20], PERIOD)).all(), "a short recording is taken"
+
+
+def test_what_cannot_be_asked_is_refused(robot: Robot, log: Swayed) -> None:
     spec = BaseStateSpec.model_validate({"imu": {"link": "left_hand"}})
     with pytest.raises(ConfigError, match="'left_hand' moves in the base, with joint 'left_elbow'"):
         base_state(robot, log.run, spec)
-
-
-def test_pose_and_unit_are_not_both_given() -> None:
     with pytest.raises(ValueError, match="give pose or imu, not both"):
         BaseStateSpec.model_validate({"pose": "pose", **UNIT})

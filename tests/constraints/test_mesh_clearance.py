@@ -5,11 +5,11 @@ import pytest
 
 from excite_cli.constraints.mesh_clearance import MeshClearance
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
-from excite_cli.excitation.gradient_check import central_differences, relative_error
 from excite_cli.geometry.pair_table import PairTable
 from excite_cli.proof.enclosed_motion import EnclosedMotion
-from excite_cli.proof.enclosed_trajectory import enclosed_states, intervals_of
+from excite_cli.proof.enclosed_trajectory import Intervals, enclosed_states, intervals_of
 from excite_cli.trajectory.fourier import FourierTrajectory
+from tests.constraints.test_gradients import check_gradients
 from tests.robot.random_robots import random_robot
 
 ROBOT = random_robot(2, joints=4)
@@ -41,16 +41,12 @@ def test_margins_are_the_table_less_what_is_kept() -> None:
 
 
 def test_gradients_by_differences() -> None:
-    constraint = MeshClearance((table(1, (0, 2)), table(2, (3, 1))))
-    q = np.random.default_rng(1).uniform(-0.9, 0.9, (6, ROBOT.n))
-    for column in range(2):
-        times = np.arange(len(q))
-        found = constraint.gradients(states_of(q), times, np.full(len(q), column))[0]
-        assert found is not None
-        expected = central_differences(
-            lambda x, column=column: float(constraint.margins(states_of(x))[:, column].sum()), q
-        )
-        assert relative_error(found, expected) < 1e-5
+    check_gradients(ROBOT, MeshClearance((table(1, (0, 2)), table(2, (3, 1)))), 1, 1e-5)
+
+
+def bounds(constraint: MeshClearance, coefficients: np.ndarray, intervals: Intervals) -> np.ndarray:
+    states = enclosed_states(FAMILY, coefficients, intervals)
+    return np.asarray(constraint.least(EnclosedMotion(ROBOT, states)))
 
 
 @pytest.mark.parametrize("width", [0.1, 0.01])
@@ -59,9 +55,7 @@ def test_bounds_hold_at_every_instant(width: float) -> None:
     rng = np.random.default_rng(3)
     coefficients = rng.normal(size=(FAMILY.n_coefficients, ROBOT.n)) * 0.2
     intervals = intervals_of(FAMILY, width)
-    least = constraint.least(
-        EnclosedMotion(ROBOT, enclosed_states(FAMILY, coefficients, intervals))
-    )
+    least = bounds(constraint, coefficients, intervals)
     truth = []
     for s in np.linspace(-1, 1, 21):
         times = intervals.middles + s * intervals.halves
@@ -70,10 +64,7 @@ def test_bounds_hold_at_every_instant(width: float) -> None:
     assert np.all(least <= smallest + 1e-12)
     if width < 0.05:
         assert np.median((smallest - least)[np.isfinite(least)]) < 5e-3
-
-
-def test_nothing_is_known_beyond_the_table() -> None:
-    constraint = MeshClearance((table(5, (0, 2), reach=0.3),))
+    # Nothing is known beyond a table.
+    small = MeshClearance((table(5, (0, 2), reach=0.3),))
     still = FAMILY.constant(np.full(ROBOT.n, 0.5))
-    motion = EnclosedMotion(ROBOT, enclosed_states(FAMILY, still, intervals_of(FAMILY, 1.0)))
-    assert np.all(constraint.least(motion) == -np.inf)
+    assert np.all(bounds(small, still, intervals_of(FAMILY, 1.0)) == -np.inf)

@@ -1,28 +1,22 @@
 """Floor, walls and boxes: gradients, bounds, reasons, and what a motion does with and without."""
 
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from excite_cli.config.load import load_spec
 from excite_cli.constraints.obstacle_clearance import Surroundings
-from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
+from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.admissible import fine_times, worst_margins
-from excite_cli.excitation.generate import generate_motion
-from excite_cli.excitation.gradient_check import central_differences
 from excite_cli.excitation.motion import Motion
-from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.excitation.solvers.interior_point import InteriorPoint
-from excite_cli.excitation.stack import Stack
+from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.start import clear_posture
 from excite_cli.excitation.task import MotionTask
+from tests.constraints.test_gradients import check_gradients
+from tests.excitation.smoke import one_motion, smoke
 from tests.geometry.obstacle_worlds import coal_distances
 
-CONFIG = Path(__file__).parents[2] / "configs" / "smoke.yaml"
-COMMON = ("optimizer.max_iterations=40", "sequence.motions=1")
 AROUND = (
     "constraints.surroundings={floor: 0.0, margin: 0.02, "
     "walls: {wall: {point: [-0.5, 0, 0], normal: [1, 0.2, 0]}}, "
@@ -32,7 +26,7 @@ AROUND = (
 
 
 def _problem(*settings: str) -> Problem:
-    return build_problem(load_spec(CONFIG, [*COMMON, *settings]), CONFIG.parent)
+    return smoke("optimizer.max_iterations=40", "sequence.motions=1", *settings)
 
 
 @cache
@@ -42,44 +36,24 @@ def _around() -> tuple[Problem, Surroundings]:
     return problem, found
 
 
-def _motion(problem: Problem) -> Motion:
-    solver = InteriorPoint()
-    return generate_motion(problem, solver, Stack.empty(problem.base.rank), 1, 1, lambda _: None)
-
-
 def _least_by_coal(problem: Problem, constraint: Surroundings, motion: Motion) -> float:
     """Least distance less what is kept [m] at 1 kHz, of the true capsules and boxes."""
-    basis = problem.trajectory.basis(fine_times(problem))
-    q = problem.states(motion.coefficients, basis).q
-    quick = constraint.margins(problem.states(motion.coefficients, basis)).min(axis=0)
+    states = problem.states(motion.coefficients, problem.trajectory.basis(fine_times(problem)))
+    quick = constraint.margins(states).min(axis=0)
     near = np.argsort(quick)[:4]  # of all pairs the four that come nearest: coal is slow
     pairs = [constraint.pairs.checked[k] for k in near]
-    args = (problem.robot, constraint.capsules, constraint.obstacles, pairs, q)
+    args = (problem.robot, constraint.capsules, constraint.obstacles, pairs, states.q)
     return float((coal_distances(*args) - constraint.pairs.kept[near]).min())
 
 
 def test_gradients_equal_differences() -> None:
     problem, constraint = _around()
-    q, v, a = problem.robot.draw_states(12, 3)
-    margins = constraint.margins(States(BatchKinematics(problem.robot), q, v, a))
-    assert margins.shape == (12, len(constraint.labels)) == (12, len(constraint.scale))
-    times, columns = np.nonzero(margins < 0.2)
-    chosen = np.random.default_rng(0).permutation(len(times))[:30]
-    times, columns = times[chosen], columns[chosen]
-    by_q, by_v, by_a = constraint.gradients(
-        States(BatchKinematics(problem.robot), q, v, a), times, columns
-    )
-    assert by_q is not None
-    assert by_v is None
-    assert by_a is None
-    for row, (t, column) in enumerate(zip(times, columns, strict=True)):
-
-        def margin(x: np.ndarray, t: int = t, c: int = column) -> float:
-            states = States(BatchKinematics(problem.robot), x[None], v[t : t + 1], a[t : t + 1])
-            return float(constraint.margins(states)[0, c])
-
-        expected = central_differences(margin, q[t], 1e-6)
-        np.testing.assert_allclose(by_q[row], expected, atol=2e-6)
+    for seed in range(6):
+        check_gradients(problem.robot, constraint, seed, 2e-6)
+    assert "tool – table" in constraint.labels
+    things = {label.split(" – ")[1] for label in constraint.labels}
+    assert things == {"floor", "wall", "table", "shelf"}
+    assert not any(label.startswith("base") for label in constraint.labels)
 
 
 @pytest.mark.parametrize("share", [0.3, 1.0])
@@ -94,22 +68,13 @@ def test_quick_margins_are_exact_within_reach_and_bounds_beyond(share: float) ->
     assert np.all((quick >= reach)[~near])
 
 
-def test_labels_name_link_and_thing() -> None:
-    _, constraint = _around()
-    assert "tool – table" in constraint.labels
-    assert {label.split(" – ")[1] for label in constraint.labels} == {
-        "floor", "wall", "table", "shelf",
-    }  # fmt: skip
-    assert not any(label.startswith("base") for label in constraint.labels)
-
-
 def test_with_it_the_margin_is_kept_and_without_it_the_table_is_hit() -> None:
     problem, constraint = _around()
-    kept = _motion(problem)
+    kept = one_motion(problem)
     assert all(worst.margin >= 0 for worst in worst_margins(problem, kept.coefficients).values())
     assert kept.margins["surroundings"].unit == "m"
     assert _least_by_coal(problem, constraint, kept) > -1e-6
-    free = _motion(_problem())
+    free = one_motion(_problem())
     assert _least_by_coal(problem, constraint, free) < -0.05  # not merely within the margin
 
 

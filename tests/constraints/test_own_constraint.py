@@ -1,19 +1,15 @@
 """A constraint that the program has never seen, in one file and a line of the catalogue."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from excite_cli.config.load import load_spec, parse_spec, spec_as_yaml
+from excite_cli.config.load import parse_spec, spec_as_yaml
 from excite_cli.constraints.catalogue import OWN
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.admissible import path_of, worst_margins
 from excite_cli.excitation.inspection import Look, inspect
-from excite_cli.excitation.motion import Motion
-from excite_cli.excitation.problem import Problem, build_problem
+from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
-from excite_cli.excitation.run import continue_run, new_result
 from excite_cli.report.campaign import Campaign
 from excite_cli.report.margin_section import margin_section
 from excite_cli.report.motion_figure import draw_margins
@@ -21,10 +17,10 @@ from excite_cli.report.motion_section import motion_section
 from excite_cli.trajectory.fade import Segment
 from excite_cli.view.instants import instants_of
 from excite_cli.view.scene import build_scene
+from tests.excitation.smoke import planned, smoke
 
 from .joint_power import JointPower
 
-CONFIG = Path(__file__).parents[2] / "configs" / "smoke.yaml"
 COMMON = ["optimizer.max_iterations=40", "sequence.motions=1"]
 LIMIT = 4.0  # [W]
 
@@ -37,27 +33,20 @@ def catalogue_line() -> None:
 
 
 def _problem(*settings: str) -> Problem:
-    return build_problem(load_spec(CONFIG, [*COMMON, *settings]), CONFIG.parent)
-
-
-def _planned(problem: Problem) -> Result:
-    def silent(index: int):
-        return lambda progress: None
-
-    return continue_run(problem, new_result(problem, [], {}), silent, lambda step, result: None)
+    return smoke(*COMMON, *settings)
 
 
 @pytest.fixture(scope="module")
 def kept() -> tuple[Problem, Result]:
     problem = _problem(f"constraints.own.joint_power.limit={LIMIT}")
-    return problem, _planned(problem)
+    return problem, planned(problem)
 
 
 def test_with_it_the_limit_holds_and_without_it_is_broken(kept: tuple[Problem, Result]) -> None:
     problem, result = kept
     assert problem.constraints[-1].name == "joint_power"
     assert worst_margins(problem, result.motions[0].coefficients)["joint_power"].margin >= 0
-    free = _planned(_problem()).motions[0]
+    free = planned(_problem()).motions[0]
     assert "joint_power" not in free.margins
     broken = worst_margins(problem, free.coefficients)["joint_power"]
     assert broken.margin < -0.5
@@ -88,19 +77,12 @@ def test_reports_and_views_show_it(kept: tuple[Problem, Result]) -> None:
     figure = draw_margins(motion, problem)
     assert [axes.get_title(loc="left") for axes in figure.axes][-1] == "Joint power"
     assert figure.axes[-1].get_ylabel() == "margin [W]"
-    shown = instants_of(problem, _segment(problem, motion), np.linspace(0.0, 6.0, 5))
+    segment = Segment("motion_1", problem.trajectory, motion.coefficients)
+    shown = instants_of(problem, segment, np.linspace(0.0, 6.0, 5))
     assert shown.margins[-1].name == "joint_power"
     assert build_scene(problem, [shown.q]).capsules
-
-
-def _segment(problem: Problem, motion: Motion) -> Segment:
-    return Segment("motion_1", problem.trajectory, motion.coefficients)
-
-
-def test_it_is_stored_and_read_again(kept: tuple[Problem, Result]) -> None:
-    problem, _ = kept
-    again = parse_spec(spec_as_yaml(problem.spec))
-    assert again.constraints.own == {"joint_power": {"limit": LIMIT}}
+    stored = parse_spec(spec_as_yaml(problem.spec))
+    assert stored.constraints.own == {"joint_power": {"limit": LIMIT}}
 
 
 @pytest.mark.parametrize(

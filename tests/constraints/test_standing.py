@@ -1,7 +1,5 @@
 """What holds at a motion's own speed and standing still holds at any speed between."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -12,17 +10,18 @@ from excite_cli.excitation.admissible import verdicts
 from excite_cli.excitation.problem import Problem
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.enclosed_trajectory import enclosed_states, intervals_of
+from tests.excitation.smoke import CONFIG
 
-CONFIGS = Path(__file__).parents[2] / "configs"
 OF_FORCES = {"joint_torque", "zmp", "contact"}
 QUICK = ["constraints.self_collision=null", "constraints.any_speed=true"]
+TALOS = CONFIG.with_name("talos_base.yaml")
 
 
 @pytest.fixture(scope="module", params=["uncertain", "as in the URDF"])
 def problem(request: pytest.FixtureRequest) -> Problem:
     """A humanoid on its feet."""
     more = [] if request.param == "uncertain" else ["uncertainty=null"]
-    return load_problem(CONFIGS / "talos_base.yaml", [*QUICK, *more])
+    return load_problem(TALOS, [*QUICK, *more])
 
 
 def both(problem: Problem) -> list[tuple[Constraint, Constraint]]:
@@ -33,13 +32,13 @@ def both(problem: Problem) -> list[tuple[Constraint, Constraint]]:
 
 def test_only_what_is_about_forces_is_asked_of_the_standing_robot(problem: Problem) -> None:
     names = [each.name for each in problem.constraints]
-    assert {name for name in names if name.endswith("_standing")} == {
-        f"{name}_standing" for name in OF_FORCES
-    }
-    plain = load_problem(CONFIGS / "talos_base.yaml", QUICK[:1])
-    assert [name for name in names if not name.endswith("_standing")] == [
-        each.name for each in plain.constraints
-    ]
+    standing = {f"{name}_standing" for name in OF_FORCES}
+    assert {name for name in names if name.endswith("_standing")} == standing
+    plain = [each.name for each in load_problem(TALOS, QUICK[:1]).constraints]
+    assert [name for name in names if name not in standing] == plain
+    found = verdicts(problem, problem.still(problem.robot.posture))
+    states = {each.name: each.state for each in found}
+    assert all(states[name] == "proved" for name in standing), "standing still is proved"
 
 
 def test_slower_motions_keep_what_the_motion_and_the_standing_robot_keep(
@@ -86,9 +85,3 @@ def test_bounds_over_intervals_are_those_of_the_standing_robot(problem: Problem)
             own = constraint.least(motion)
             assert own is not None
             assert np.abs(own - bounds).max() > 1.0
-
-
-def test_standing_still_is_proved(problem: Problem) -> None:
-    found = verdicts(problem, problem.still(problem.robot.posture))
-    states = {each.name: each.state for each in found}
-    assert all(states[f"{name}_standing"] == "proved" for name in OF_FORCES)

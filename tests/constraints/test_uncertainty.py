@@ -1,8 +1,8 @@
 """Limits that hold for every admitted inertia: values against adversaries, gradients, motions."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -27,13 +27,11 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty, box, inertia_uncertainty
 from excite_cli.dynamics.whole_robot import drawn_states, whole_parameters
 from excite_cli.errors import ConfigError
-from excite_cli.excitation.generate import generate_motion
 from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.excitation.solvers.interior_point import InteriorPoint
-from excite_cli.excitation.stack import Stack
 from excite_cli.robot.model import Robot
-from tests.constraints.test_gradients import _check as check_gradients
+from tests.constraints.test_gradients import check_gradients
 from tests.dynamics.test_uncertain_inertias import SPEC, knowledge
+from tests.excitation.smoke import CONFIG, one_motion, smoke
 from tests.robot.random_robots import random_robot
 
 CORNERS = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))
@@ -43,7 +41,6 @@ ALL = ConstraintsSpec(
     balance=PolygonSpec(kind="polygon", vertices=CORNERS),
     contact=ContactSpec(vertices=CORNERS, height=-0.4, friction=0.6, torsion=0.2, min_load=5.0),
 )
-SMOKE = Path(__file__).parents[2] / "configs" / "smoke.yaml"
 
 
 def admitted(robot: Robot, fitted: bool, seed: int = 0) -> InertiaUncertainty:
@@ -93,7 +90,11 @@ def test_margins_in_a_box_are_reached_by_a_corner_and_by_none_undercut(seed: int
         for corner in corners:
             assert np.all(margins <= by_mujoco(constraint, plant, corner, states) + 1e-9)
         for column in range(0, margins.shape[1], 2):
-            worst = adversary(constraint, plant, states, column, phi, reach)
+
+            def margin(side: Array, of: Constraint = constraint, column: int = column) -> float:
+                return float(by_mujoco(of, plant, phi + side * reach, states)[0, column])
+
+            worst = adversary(margin, len(phi))
             assert np.isclose(margins[0, column], worst, rtol=1e-6, atol=1e-9), constraint.name
 
 
@@ -103,32 +104,18 @@ def standing_slowly(robot: Robot, seed: int) -> States:
     return States(states.kinematics, states.q, 0.3 * states.v, 0.1 * states.a)
 
 
-def adversary(
-    constraint: Constraint,
-    plant: WholePlant,
-    states: States,
-    column: int,
-    phi: Array,
-    reach: Array,
-) -> float:
+def adversary(margin: Callable[[Array], float], size: int) -> float:
     """The least margin that ascent over the corners finds, coordinate by coordinate."""
-
-    def margin(side: Array) -> float:
-        return float(by_mujoco(constraint, plant, phi + side * reach, states)[0, column])
-
-    side = np.zeros(len(phi))
-    best = margin(side)
-    for _ in range(4):
+    side = np.zeros(size)
+    best, before = margin(side), np.inf
+    while best < before - 1e-12:
         before = best
-        for index in np.flatnonzero(reach):
+        for index in range(size):
             for sign in (-1.0, 1.0):
                 tried = side.copy()
                 tried[index] = sign
-                value = margin(tried)
-                if value < best:
+                if (value := margin(tried)) < best:
                     best, side = value, tried
-        if best > before - 1e-12:
-            break
     return best
 
 
@@ -208,10 +195,8 @@ def planned(robust: bool) -> tuple[Problem, Array]:
     settings = ["constraints.torque.scale=0.25", "optimizer.max_iterations=60"]
     settings += ["constraints.self_collision=null", "sequence.motions=1", "optimizer.certify=false"]
     settings += ["uncertainty={mass: 0.2, center_of_mass: 0.01, inertia: 0.2}"] if robust else []
-    problem = build_problem(load_spec(SMOKE, settings), SMOKE.parent)
-    solver = InteriorPoint()
-    stack = Stack.empty(problem.base.rank)
-    return problem, generate_motion(problem, solver, stack, 1, 1, lambda p: None).coefficients
+    problem = smoke(*settings)
+    return problem, one_motion(problem).coefficients
 
 
 def overload(robust: bool) -> float:
@@ -245,4 +230,4 @@ def test_a_disc_too_small_for_the_uncertainty_leaves_no_room() -> None:
 
 def test_a_fit_must_be_read_first() -> None:
     with pytest.raises(ConfigError, match=r"uncertainty.fit: fit.h5 was not read"):
-        build_problem(load_spec(SMOKE, ["uncertainty={fit: fit.h5}"]), SMOKE.parent)
+        build_problem(load_spec(CONFIG, ["uncertainty={fit: fit.h5}"]), CONFIG.parent)

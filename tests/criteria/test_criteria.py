@@ -6,11 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from excite_cli.config.spec import CriterionSpec
+from excite_cli.criteria.base import Array, Criterion
 from excite_cli.criteria.catalogue import CRITERIA, build_criterion
 from excite_cli.criteria.condition_number import ConditionNumber
 from excite_cli.criteria.smooth_condition_number import SmoothConditionNumber
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.gradient_check import central_differences, relative_error
+from excite_cli.excitation.problem import Problem
+from tests.excitation.smoke import one_motion, smoke
 
 
 def test_unknown_kind_suggests_the_nearest() -> None:
@@ -63,13 +66,6 @@ def test_smooth_form_bounds_the_condition_number(seed: int, size: int, p: float)
     assert exact - 1e-12 <= smooth <= exact + 2 * np.log(size) / p + 1e-12
 
 
-def test_smooth_form_does_not_overflow() -> None:
-    sigma = np.array([1e150, 1.0, 1e-150])
-    criterion = SmoothConditionNumber(500.0)
-    assert criterion.value(sigma) == pytest.approx(np.log(1e300))
-    assert np.all(np.isfinite(criterion.derivative(sigma)))
-
-
 def test_continuation_ends_at_or_near_what_was_asked() -> None:
     for kind in CRITERIA:
         criterion = build_criterion(CriterionSpec(kind=kind, smoothing=32.0))
@@ -79,11 +75,42 @@ def test_continuation_ends_at_or_near_what_was_asked() -> None:
             assert steps[-1] == criterion or steps[-1] is criterion
 
 
-def test_scaling_the_regressor_leaves_the_condition_number() -> None:
+def test_smooth_forms_of_extreme_spectra() -> None:
+    """No overflow, no change with scale, and infinite where a parameter does not show."""
+    sigma = np.array([1e150, 1.0, 1e-150])
+    criterion = SmoothConditionNumber(500.0)
+    assert criterion.value(sigma) == pytest.approx(np.log(1e300))
+    assert np.all(np.isfinite(criterion.derivative(sigma)))
     sigma = _spectrum(5, 9)
     for criterion in (ConditionNumber(), SmoothConditionNumber(16.0)):
         assert criterion.value(7.0 * sigma) == pytest.approx(criterion.value(sigma))
-
-
-def test_a_parameter_that_does_not_show_makes_the_smooth_criterion_infinite() -> None:
     assert SmoothConditionNumber(4.0).value(np.array([2.0, 1.0, 0.0])) == np.inf
+
+
+class WorstThree(Criterion):
+    """Minus the mean logarithm of the three smallest singular values."""
+
+    name = "worst_three"
+
+    def value(self, sigma: Array) -> float:
+        return -float(np.mean(np.log(sigma[-3:])))
+
+    def derivative(self, sigma: Array) -> Array:
+        derivative = np.zeros_like(sigma)
+        derivative[-3:] = -1.0 / (3.0 * sigma[-3:])
+        return derivative
+
+
+def _planned(kind: str) -> tuple[Problem, float]:
+    problem = smoke(f"criterion.kind={kind}", "optimizer.max_iterations=40")
+    objective = problem.objective()
+    sigma = objective.spectrum(objective.block(one_motion(problem).coefficients)).sigma
+    return problem, WorstThree().value(sigma)
+
+
+def test_a_plan_by_it_is_better_by_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(CRITERIA, "worst_three", lambda spec: WorstThree())
+    problem, reached = _planned("worst_three")
+    assert isinstance(problem.criterion, WorstThree)
+    _, by_another = _planned("condition_number")
+    assert reached < by_another - 0.05

@@ -1,6 +1,10 @@
-"""Base parameters: the right number, a mapping that holds, robust against dust, told in words."""
+"""Base parameters: the right number, a mapping that holds, robust against dust, told in words.
+
+Angles that are right but for decimals give the base parameters of right angles, and a note.
+"""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,8 +13,9 @@ from hypothesis import strategies as st
 
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.dynamics import base_parameters as module
-from excite_cli.dynamics.base_parameters import find_base_parameters
+from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.dynamics.regressor import Regressor, standard_parameters
+from excite_cli.robot.description import load_description
 from excite_cli.robot.model import Robot, build_robot
 from tests.robot.random_robots import random_robot
 
@@ -83,8 +88,75 @@ def test_words_say_what_is_grouped() -> None:
         assert total == pytest.approx(value, rel=1e-9, abs=1e-9)
 
 
-def test_same_robot_same_selection() -> None:
-    robot = random_robot(4, joints=5)
-    first, second = find_base_parameters(robot), find_base_parameters(robot)
-    assert np.array_equal(first.selection, second.selection)
-    assert np.array_equal(first.mapping, second.mapping)
+HALF_TURN = (np.pi, 0.0, 0.0)
+LINK = """<link name="l{0}">
+<inertial><origin xyz="0.1 0.05 0.2"/><mass value="2"/>
+<inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0.001" ixz="0.002" iyz="0"/></inertial></link>"""
+JOINT = """<joint name="j{0}" type="revolute"><parent link="l{1}"/><child link="l{0}"/>
+<origin xyz="0 0.1 0.3" rpy="{2}"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" velocity="3" effort="50"/></joint>"""
+
+
+def _condition(robot: Robot, base: BaseParameters) -> float:
+    y = Regressor(robot).evaluate(*robot.draw_states(300, 5))
+    return float(np.linalg.cond(y.reshape(-1, y.shape[-1])[:, base.selection]))
+
+
+def _same(robot: Robot, exact: Robot) -> BaseParameters:
+    """The base of `robot`, after it was found to be as good as that of `exact`."""
+    base, right = find_base_parameters(robot), find_base_parameters(exact)
+    assert base.rank == right.rank
+    assert np.array_equal(base.selection, right.selection)
+    assert _condition(robot, base) == pytest.approx(_condition(exact, right), rel=0.01)
+    assert right.note == ""
+    return base
+
+
+@pytest.mark.parametrize("angle", [3.14, 3.1416, 3.14159265])
+@pytest.mark.parametrize("urdf", ["ur10", "panda"])
+def test_a_base_that_is_turned_by_nearly_half_a_turn(urdf: str, angle: float) -> None:
+    spec = RobotSpec(urdf=f"example-robot-data:{urdf}", base_orientation=(angle, 0.0, 0.0))
+    exact = spec.model_copy(update={"base_orientation": HALF_TURN})
+    base = _same(build_robot(spec), build_robot(exact))
+    assert base.tilted == (build_robot(spec).joint_names[0],)
+    assert base.hidden in (2, 3)  # the third of a Panda is a matter of rounding
+    assert f"show {base.hidden} more base parameters" in base.note
+    robot = build_robot(spec)
+    y = Regressor(robot).evaluate(*robot.draw_states(50, 3))
+    assert np.abs(y @ base.silent_direction()).max() < 1e-9, "the angles as given count"
+
+
+@pytest.mark.parametrize("angle", ["1.57", "1.571", "1.5708"])
+def test_an_upright_axis_behind_two_rounded_turns(angle: str, tmp_path: Path) -> None:
+    def robot(angle: str) -> Robot:
+        fixed = JOINT.format(1, 0, f"{angle} 0 0").replace("revolute", "fixed")
+        turns = ("-1.5707963267948966 0 0", f"{angle} 0 0")
+        links = "".join(LINK.format(k) for k in range(4))
+        joints = "".join(JOINT.format(k, k - 1, turn) for k, turn in enumerate(turns, start=2))
+        path = tmp_path / f"{angle}.urdf"
+        path.write_text(f'<robot name="r">{links}{fixed}{joints}</robot>', encoding="utf-8")
+        return build_robot(RobotSpec(urdf=str(path)))
+
+    base = _same(robot(angle), robot(repr(np.pi / 2)))
+    rounded_in_the_urdf = angle == "1.5708"  # those are made right when it is read
+    assert base.tilted == (() if rounded_in_the_urdf else ("j2",))
+
+
+def test_the_angles_of_example_robots_with_three_decimals(tmp_path: Path) -> None:
+    path = load_description("example-robot-data:panda", (), None).path
+    text = Path(path).read_text(encoding="utf-8")
+    rounded = re.sub(r'rpy="[^"]*"', lambda m: re.sub(r"1\.57\d*", "1.57", m.group()), text)
+    assert rounded != text
+    (tmp_path / "panda.urdf").write_text(rounded, encoding="utf-8")
+    joints = tuple(f"panda_joint{k}" for k in range(1, 8))
+    packages = (str(Path(path).parents[2]),)
+    near = build_robot(
+        RobotSpec(urdf=str(tmp_path / "panda.urdf"), package_dirs=packages, joints=joints)
+    )
+    _same(near, build_robot(RobotSpec(urdf="example-robot-data:panda", joints=joints)))
+
+
+def test_a_real_tilt_counts() -> None:
+    tilted = RobotSpec(urdf="example-robot-data:ur10", base_orientation=(0.01, 0.0, 0.0))
+    base = find_base_parameters(build_robot(tilted))
+    assert (base.rank, base.tilted) == (38, ())

@@ -41,9 +41,8 @@ def test_a_length_is_the_largest_of_gyration_lever_and_half_reach(robot: Robot) 
 
 def test_of_a_body_without_mass_only_its_reach_counts(robot: Robot) -> None:
     """Its first moments, divided by next to nothing, would be kilometres."""
-    count = robot.model.njoints - 1
     nothing = [1e-9, 1e-6, 0, 0, 1e-6, 0, 1e-6, 0, 0, 1e-6]
-    lengths = body_lengths(robot, np.array([nothing] * count).ravel())
+    lengths = body_lengths(robot, np.tile(nothing, robot.model.njoints - 1))
     reach = half_reach(robot)
     assert lengths[:-1] == pytest.approx(reach[:-1])
     assert lengths[-1] == pytest.approx(np.median(reach[reach > 0]))

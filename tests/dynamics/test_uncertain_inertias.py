@@ -44,6 +44,16 @@ def knowledge(robot: Robot, base: BaseParameters, seed: int, precision: float) -
     return FitKnowledge(values, root @ root.T, names, robot.fingerprint(), "fit.h5")
 
 
+def fitted(
+    seed: int, precision: float, joints: int = 3, **more: object
+) -> tuple[Robot, BaseParameters, FitKnowledge, Array]:
+    """A robot, its base parameters, a fit of them, and their rows over all inertias."""
+    robot = random_robot(seed, joints=joints, **more)
+    base = find_base_parameters(robot)
+    rows = np.hstack([np.zeros((base.rank, 10)), base.mapping])
+    return robot, base, knowledge(robot, base, seed, precision), rows
+
+
 def exact_least(
     y: Array, phi: Array, reach: Array, mapping: Array, fit: FitKnowledge, sigmas: float
 ) -> float:
@@ -130,12 +140,10 @@ def test_quotients_are_least_at_a_vertex(seed: int, heavy: float) -> None:
 def test_bounds_after_a_fit_are_sound_and_near_the_exact_program(
     seed: int, precision: float
 ) -> None:
-    robot = random_robot(seed, joints=4, floating=seed == 1, rows=("joints",))
-    base = find_base_parameters(robot)
-    fit = knowledge(robot, base, seed, precision)
+    more = {"floating": seed == 1, "rows": ("joints",)}
+    robot, base, fit, mapping = fitted(seed, precision, 4, **more)
     admitted = inertia_uncertainty(SPEC, robot, base, fit)
     phi, reach = whole_parameters(robot), admitted.pieces[0].corners
-    mapping = np.hstack([np.zeros((base.rank, 10)), base.mapping])
     states = drawn_states(robot, 4, seed)
     torques = Regressor(replace(robot, rows=robot.moved)).evaluate(states.q, states.v, states.a)
     torques = np.pad(torques, ((0, 0), (0, 0), (10, 0)))
@@ -174,9 +182,8 @@ def test_a_good_fit_opens_the_set_and_a_bad_one_leaves_the_box() -> None:
 
 
 def test_the_derivative_of_a_bound_is_its_worst_inertia() -> None:
-    robot = random_robot(4, joints=3)
-    base = find_base_parameters(robot)
-    admitted = inertia_uncertainty(SPEC, robot, base, knowledge(robot, base, 4, 0.1))
+    robot, base, fit, _ = fitted(4, 0.1)
+    admitted = inertia_uncertainty(SPEC, robot, base, fit)
     for y in np.random.default_rng(0).normal(size=(4, 40)):
         expected = central_differences(lambda x: float(admitted.least(x)), y, 1e-7)
         assert np.allclose(admitted.worst(y[None])[0], expected, atol=1e-5)
@@ -184,15 +191,12 @@ def test_the_derivative_of_a_bound_is_its_worst_inertia() -> None:
 
 
 def test_what_the_data_did_not_show_is_left_to_the_box() -> None:
-    robot = random_robot(5, joints=3)
-    base = find_base_parameters(robot)
-    fit = knowledge(robot, base, 5, 0.05)
+    robot, base, fit, y = fitted(5, 0.05)
     covariance = fit.covariance.copy()
     covariance[2] = covariance[:, 2] = 0.0
     covariance[2, 2] = np.inf
     unseen = inertia_uncertainty(SPEC, robot, base, replace(fit, covariance=covariance))
     seen = inertia_uncertainty(SPEC, robot, base, fit)
-    y = np.hstack([np.zeros((base.rank, 10)), base.mapping])
     below, above = unseen.least_both(y)
     assert np.all(np.isfinite(below))
     width, known = -above - below, -np.add(*seen.least_both(y))
@@ -201,13 +205,9 @@ def test_what_the_data_did_not_show_is_left_to_the_box() -> None:
 
 
 def test_a_fit_outside_the_box_widens_it() -> None:
-    robot = random_robot(6, joints=3)
-    base = find_base_parameters(robot)
-    fit = knowledge(robot, base, 6, 0.01)
+    robot, base, fit, y = fitted(6, 0.01)
     truth = 1.6 * whole_parameters(robot)
-    values = base.mapping @ truth[10:]
-    admitted = inertia_uncertainty(SPEC, robot, base, replace(fit, values=values))
-    y = np.hstack([np.zeros((base.rank, 10)), base.mapping])
+    admitted = inertia_uncertainty(SPEC, robot, base, replace(fit, values=y @ truth))
     below, above = admitted.least_both(y)
     assert np.all(below <= y @ truth + 1e-9)
     assert np.all(y @ truth <= -above + 1e-9)
@@ -221,57 +221,46 @@ def test_a_fit_that_contradicts_the_box_leaves_something_admitted(
     precision: float, off: float
 ) -> None:
     """Otherwise bounds would be bounds over an empty set: the least above the largest."""
-    robot = random_robot(8, joints=4)
-    base = find_base_parameters(robot)
-    fit = knowledge(robot, base, 8, precision)
-    values = base.mapping @ (off * whole_parameters(robot)[10:])
-    admitted = inertia_uncertainty(SPEC, robot, base, replace(fit, values=values))
+    robot, base, fit, mapping = fitted(8, precision, 4)
+    phi = whole_parameters(robot)
+    fit = replace(fit, values=mapping @ (off * phi))
+    admitted = inertia_uncertainty(SPEC, robot, base, fit)
     states = drawn_states(robot, 10)
     y = np.pad(Regressor(robot).evaluate(states.q, states.v, states.a), ((0, 0), (0, 0), (10, 0)))
-    below, above = admitted.least_both(y.reshape(-1, y.shape[-1]))
+    y = y.reshape(-1, y.shape[-1])
+    below, above = admitted.least_both(y)
     assert np.all(below <= -above)
-    mapping = np.hstack([np.zeros((base.rank, 10)), base.mapping])
-    phi, reach = whole_parameters(robot), admitted.pieces[0].corners
-    row = y.reshape(-1, y.shape[-1])[0]
-    exact = exact_least(row, phi, reach, mapping, replace(fit, values=values), SPEC.sigmas)
-    assert np.isfinite(exact)
+    reach = admitted.pieces[0].corners
+    assert np.isfinite(exact_least(y[0], phi, reach, mapping, fit, SPEC.sigmas))
 
 
-def test_a_fit_that_bounds_of_zero_cannot_follow_is_refused() -> None:
-    """Nothing would be admitted, and bounds over nothing would prove anything."""
-    robot = random_robot(9, joints=3)
-    base = find_base_parameters(robot)
-    fit = knowledge(robot, base, 9, 0.01)
-    heavier = replace(fit, values=base.mapping @ (1.5 * whole_parameters(robot)[10:]))
+def test_fits_that_cannot_be_followed_are_refused() -> None:
+    """Bounds of zero would admit nothing, and bounds over nothing would prove anything."""
+    robot, base, fit, mapping = fitted(9, 0.01)
+    heavier = replace(fit, values=mapping @ (1.5 * whole_parameters(robot)))
     stiff = UncertaintySpec(mass=0.0, center_of_mass=0.0, inertia=0.0)
     with pytest.raises(ConfigError, match="some bounds are zero"):
         inertia_uncertainty(stiff, robot, base, heavier)
     assert len(inertia_uncertainty(SPEC, robot, base, heavier).pieces) > 1
+    with pytest.raises(FileError, match=r"fit.h5 was made for another robot"):
+        inertia_uncertainty(SPEC, robot, base, fitted(8, 1.0)[2])
 
 
 def test_bodies_are_named_by_joint_link_or_base() -> None:
-    robot = random_robot(7, joints=3)
+    """Unknown and locked ones are told."""
     exact = BodyUncertaintySpec(mass=0.0, center_of_mass=0.0, inertia=0.0)
-    for names in (("base", "joint_2"), ("link_0", "link_2")):
+
+    def exact_ones(robot: Robot, *names: str) -> list[int]:
         reach = box(UncertaintySpec(bodies=dict.fromkeys(names, exact)), robot).reshape(-1, 10)
-        assert np.flatnonzero(reach.sum(axis=1)).tolist() == [1, 3]
-    floating = random_robot(7, joints=3, floating=True)
-    reach = box(UncertaintySpec(bodies={"base": exact}), floating).reshape(-1, 10)
-    assert np.flatnonzero(reach.sum(axis=1)).tolist() == [2, 3, 4]
+        return np.flatnonzero(reach.sum(axis=1)).tolist()
 
-
-def test_unknown_and_locked_bodies_are_told() -> None:
-    robot = build_robot(
-        RobotSpec(urdf="example-robot-data:ur10", joints=("elbow_joint", "wrist_1_joint"))
-    )
+    robot = random_robot(7, joints=3)
+    assert exact_ones(robot, "base", "joint_2") == [1, 3]
+    assert exact_ones(robot, "link_0", "link_2") == [1, 3]
+    assert exact_ones(random_robot(7, joints=3, floating=True), "base") == [2, 3, 4]
+    moved = ("elbow_joint", "wrist_1_joint")
+    arm = build_robot(RobotSpec(urdf="example-robot-data:ur10", joints=moved))
     with pytest.raises(ConfigError, match=r"no moved joint 'elbow_join'. Did you mean 'elbow_joi"):
-        box(UncertaintySpec(bodies={"elbow_join": BodyUncertaintySpec()}), robot)
+        exact_ones(arm, "elbow_join")
     with pytest.raises(ConfigError, match=r"'wrist_2_joint'. It is locked.* Bodies: base, elbow"):
-        box(UncertaintySpec(bodies={"wrist_2_joint": BodyUncertaintySpec()}), robot)
-
-
-def test_a_fit_of_another_robot_is_refused() -> None:
-    robot, other = random_robot(8, joints=3), random_robot(9, joints=3)
-    base = find_base_parameters(other)
-    with pytest.raises(FileError, match=r"fit.h5 was made for another robot"):
-        inertia_uncertainty(SPEC, other, base, knowledge(robot, find_base_parameters(robot), 0, 1))
+        exact_ones(arm, "wrist_2_joint")

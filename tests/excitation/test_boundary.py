@@ -1,44 +1,39 @@
 """Given postures at start and end: exact, for both families, and kept by the optimiser."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from excite_cli.config.load import load_spec
 from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.excitation.admissible import smallest_margins
 from excite_cli.excitation.base_motion import base_motion
 from excite_cli.excitation.boundary import boundary_between, posture_of, straight_motion
-from excite_cli.excitation.generate import generate_motion
 from excite_cli.excitation.gradient_check import central_differences, relative_error
-from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.random_baseline import random_baseline
-from excite_cli.excitation.solvers.interior_point import InteriorPoint
-from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import random_direction, random_start
 from excite_cli.excitation.task import MotionTask
 from excite_cli.trajectory.base import Array, Trajectory
 from excite_cli.trajectory.bspline import BSplineTrajectory
 from excite_cli.trajectory.fourier import FourierTrajectory
+from tests.excitation.smoke import one_motion, smoke, task_of
 from tests.robot.random_robots import random_robot
 
-CONFIG = Path(__file__).parents[2] / "configs" / "smoke.yaml"
+BRIEF = ("sampling={}", "optimizer.max_iterations=20")
 SPLINE = (
     "trajectory={family: bspline, duration: 6, control_points: 14, start: posture, "
     "end: {shoulder_pitch: -0.5, elbow: 1.5}}"
 )
+
+
+def _task(*settings: str) -> MotionTask:
+    return task_of(*BRIEF, *settings)
+
+
 SERIES = (
     "trajectory={family: fourier, harmonics: 4, base_frequency: 1.0471975511965976, "
     "at_rest: true, start: {elbow: 0.5}}"
 )
-
-
-def _problem(*settings: str) -> Problem:
-    brief = ["sampling={}", "optimizer.max_iterations=20"]
-    return build_problem(load_spec(CONFIG, [*brief, *settings]), CONFIG.parent)
 
 
 def _ends(trajectory: Trajectory, coefficients: Array) -> tuple[Array, Array, Array]:
@@ -103,7 +98,7 @@ def test_the_straight_motion_is_straight_and_accelerates_least() -> None:
 
 @pytest.mark.parametrize("family", [SPLINE, SERIES])
 def test_the_gradient_of_the_cost_with_an_offset(family: str) -> None:
-    task = MotionTask(_problem(family))
+    task = _task(family)
     x = 0.5 * random_direction(task, np.random.default_rng(3))
     criterion = task.problem.criterion
 
@@ -117,14 +112,14 @@ def test_the_gradient_of_the_cost_with_an_offset(family: str) -> None:
 
 @pytest.mark.parametrize("family", [SPLINE, SERIES])
 def test_an_optimised_motion_keeps_its_ends_and_all_constraints(family: str) -> None:
-    problem = _problem(family)
-    task = MotionTask(problem)
+    task = _task(family)
+    problem = task.problem
     begin = random_start(task, base_motion(task, 1), (1, 1, 0))
-    solver = InteriorPoint()
-    motion = generate_motion(problem, solver, Stack.empty(problem.columns), 1, 1, lambda _: None)
-    q, v, a = _ends(problem.trajectory, motion.coefficients)
-    ends = problem.boundary.postures
-    assert np.abs(q - ends).max() < 1e-9
+    motion = one_motion(problem)
+    (random,) = random_baseline(problem, 1, 1, 5, 0.0, lambda drawn, best: None).motions
+    for each in (random, motion):
+        q, v, a = _ends(problem.trajectory, each.coefficients)
+        assert np.abs(q - problem.boundary.postures).max() < 1e-9
     assert max(np.abs(v).max(), np.abs(a).max()) < 1e-9
     times = np.linspace(0.0, problem.trajectory.duration, 6001)
     assert all(m.min() >= 0 for m in smallest_margins(problem, motion.coefficients, times))
@@ -132,38 +127,31 @@ def test_an_optimised_motion_keeps_its_ends_and_all_constraints(family: str) -> 
     assert motion.condition_number < 0.5 * before
 
 
-def test_random_motions_keep_the_ends_too() -> None:
-    problem = _problem(SPLINE)
-    found = random_baseline(problem, 1, 1, 5, 0.0, lambda drawn, best: None)
-    q, _, _ = _ends(problem.trajectory, found.motions[0].coefficients)
-    assert np.abs(q - problem.boundary.postures).max() < 1e-9
-
-
 def test_a_posture_near_a_bound_is_not_moved() -> None:
     """A margin far below what a start without given ends asks for."""
-    problem = _problem(SERIES.replace("elbow: 0.5", "elbow: 2.595, shoulder_pitch: -0.4"),
-                       "constraints.self_collision=null")  # fmt: skip
-    start = base_motion(MotionTask(problem), 1)
-    assert start.posture[2] == 2.595
-    solver = InteriorPoint()
-    motion = generate_motion(problem, solver, Stack.empty(problem.columns), 1, 1, lambda _: None)
-    q, _, _ = _ends(problem.trajectory, motion.coefficients)
+    series = SERIES.replace("elbow: 0.5", "elbow: 2.595, shoulder_pitch: -0.4")
+    task = _task(series, "constraints.self_collision=null")
+    assert base_motion(task, 1).posture[2] == 2.595
+    motion = one_motion(task.problem)
+    q, _, _ = _ends(task.problem.trajectory, motion.coefficients)
     assert np.abs(q[:, 2] - 2.595).max() < 1e-9
     assert motion.margins["joint_position"].violations == 0
 
 
-def test_a_given_posture_that_is_not_clear_is_named() -> None:
-    problem = _problem(SERIES.replace("elbow: 0.5", "shoulder_pitch: 2.1, elbow: 2.5"))
-    with pytest.raises(NoAdmissibleMotionError, match="self_collision") as error:
-        base_motion(MotionTask(problem), 1)
-    assert "trajectory.start" in str(error.value)
-    assert " m" in str(error.value)
-
-
-def test_a_way_too_long_for_the_time_is_said_to_be() -> None:
-    spline = SPLINE.replace("duration: 6", "duration: 0.6")
-    with pytest.raises(NoAdmissibleMotionError, match=r"within 0\.6 s.*longer trajectory"):
-        base_motion(MotionTask(_problem(spline)), 1)
+@pytest.mark.parametrize(
+    ("trajectory", "words"),
+    [
+        (
+            SERIES.replace("elbow: 0.5", "shoulder_pitch: 2.1, elbow: 2.5"),
+            r"(?s)trajectory\.start.*self_collision.* m\b",
+        ),
+        (SPLINE.replace("duration: 6", "duration: 0.6"), r"within 0\.6 s.*longer trajectory"),
+    ],
+    ids=["a posture that is not clear", "a way too long for the time"],
+)
+def test_what_cannot_begin_is_told(trajectory: str, words: str) -> None:
+    with pytest.raises(NoAdmissibleMotionError, match=words):
+        base_motion(_task(trajectory), 1)
 
 
 @pytest.mark.parametrize(
@@ -173,14 +161,12 @@ def test_a_way_too_long_for_the_time_is_said_to_be() -> None:
         ("{elbow: 9}", r"trajectory.start.elbow: 9 is outside its limits \[-2.6, 2.6\]"),
     ],
 )
-def test_postures_that_cannot_be(start: str, message: str) -> None:
+def test_postures_by_name(start: str, message: str) -> None:
+    """Joints that are not named are at the posture."""
     with pytest.raises(ConfigError, match=message):
-        _problem(SERIES.replace("{elbow: 0.5}", start))
-
-
-def test_joints_not_named_are_at_the_posture() -> None:
-    robot = _problem().robot
+        smoke(*BRIEF, SERIES.replace("{elbow: 0.5}", start))
+    robot = smoke(*BRIEF).robot
     assert np.array_equal(posture_of(robot, "posture", "here"), robot.posture)
-    found = posture_of(robot, {"elbow": -1.0}, "here")
-    assert found[2] == -1.0
-    assert np.array_equal(np.delete(found, 2), np.delete(robot.posture, 2))
+    wanted = robot.posture.copy()
+    wanted[2] = -1.0
+    assert np.array_equal(posture_of(robot, {"elbow": -1.0}, "here"), wanted)

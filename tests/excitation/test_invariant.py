@@ -1,23 +1,23 @@
 """Figures and criteria that do not depend on which columns are called base parameters."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.linalg import qr
 
-from excite_cli.api.loading import load_problem
+from excite_cli.criteria.base import condition_number, singular_values
 from excite_cli.dynamics.base_parameters import base_parameters_as_given
 from excite_cli.dynamics.regressor import Regressor
+from excite_cli.excitation.dense_grid import dense_condition_number, flattered
 from excite_cli.excitation.free_design import FreeDesign
 from excite_cli.excitation.gradient_check import check_gradient
 from excite_cli.excitation.invariant import design_for, invariants
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.reference_states import reference_rows, torque_metric
 from excite_cli.excitation.stack import Stack
+from tests.excitation.smoke import drawn, smoke
 
-SMOKE = Path(__file__).parents[2] / "configs" / "smoke.yaml"
 CHOICES = ("own", "first", "last")
 
 
@@ -49,64 +49,46 @@ def _with(problem: Problem, name: str) -> Problem:
 
 @pytest.fixture(scope="module")
 def problems() -> list[Problem]:
-    problem = load_problem(SMOKE, ["criterion.kind=torque_deviation"])
+    problem = smoke("criterion.kind=torque_deviation")
     return [_with(problem, name) for name in CHOICES]
-
-
-def _motion(problem: Problem, seed: int = 1) -> np.ndarray:
-    rng = np.random.default_rng(seed)
-    shape = (problem.trajectory.n_coefficients, problem.robot.n)
-    return np.asarray(0.3 * rng.normal(size=shape))
 
 
 def test_the_choices_are_different_and_so_are_condition_numbers(problems: list[Problem]) -> None:
     chosen = {tuple(problem.base.selection) for problem in problems}
     assert len(chosen) == len(CHOICES)
-    numbers = [p.objective().own_condition_number(_motion(p)) for p in problems]
+    numbers = [p.objective().own_condition_number(drawn(p, 0.3, 1)) for p in problems]
     assert max(numbers) > 1.5 * min(numbers)
 
 
-def test_torque_deviation_is_the_same_for_all(problems: list[Problem]) -> None:
-    values, gradients = [], []
+def test_deviation_and_efficiency_are_the_same_for_all(problems: list[Problem]) -> None:
+    values, gradients, data = [], [], []
     for problem in problems:
-        stack = Stack.empty(problem.columns).with_rows(problem.objective().block(_motion(problem)))
+        stack = Stack.empty(problem.columns).with_rows(
+            problem.objective().block(drawn(problem, 0.3, 1))
+        )
         value, gradient, _ = problem.objective(stack).value_and_gradient(
-            _motion(problem, 2), problem.criterion
+            drawn(problem, 0.3, 2), problem.criterion
         )
         values.append(value)
         gradients.append(gradient)
+        assert problem.base.mapping.shape[0] == problem.base.rank
+        y = Regressor(problem.robot).evaluate(*problem.robot.draw_states(60, 5))
+        y = y[:, :, problem.base.selection].reshape(-1, problem.base.rank)
+        data.append(invariants(problem, stack, FreeDesign(y.T @ y / 60, 0.0)))
     assert values[1:] == pytest.approx(values[:1] * 2, rel=1e-9)
-    for gradient in gradients[1:]:
+    for gradient, found in zip(gradients[1:], data[1:], strict=True):
         assert np.allclose(gradient, gradients[0], atol=1e-8 * np.abs(gradients[0]).max())
-
-
-def test_efficiency_and_deviation_of_data_are_the_same_for_all(problems: list[Problem]) -> None:
-    found = []
-    for problem in problems:
-        base = problem.base.mapping
-        assert base.shape[0] == problem.base.rank
-        stack = Stack.empty(problem.columns).with_rows(problem.objective().block(_motion(problem)))
-        found.append(invariants(problem, stack, _same_design(problems[0], problem)))
-    for other in found[1:]:
-        assert other.torque_deviation == pytest.approx(found[0].torque_deviation, rel=1e-9)
-        assert other.efficiency == pytest.approx(found[0].efficiency, rel=1e-8)
-
-
-def _same_design(first: Problem, problem: Problem) -> FreeDesign:
-    """A design over fixed states, on the columns of `problem`."""
-    robot = problem.robot
-    y = Regressor(robot).evaluate(*robot.draw_states(60, 5))[:, :, problem.base.selection]
-    y = y.reshape(-1, problem.base.rank)
-    return FreeDesign(y.T @ y / 60, 0.0)
+        assert found.torque_deviation == pytest.approx(data[0].torque_deviation, rel=1e-9)
+        assert found.efficiency == pytest.approx(data[0].efficiency, rel=1e-8)
 
 
 def test_an_effect_that_no_motion_shows_takes_nothing_away() -> None:
     """A torque that saturates has no column in motions that stay below it."""
-    problem = load_problem(SMOKE, ["effects=[{kind: viscous_friction}]"])
-    bare = load_problem(SMOKE, ["effects=null"])
-    block = problem.objective().block(_motion(problem))
+    problem = smoke("effects=[{kind: viscous_friction}]")
+    bare = smoke("effects=null")
+    block = problem.objective().block(drawn(problem, 0.3, 1))
     block[:, problem.base.rank :] = 0.0
-    shown = bare.objective().block(_motion(bare))
+    shown = bare.objective().block(drawn(bare, 0.3, 1))
     found, same = (
         invariants(each, Stack.empty(each.columns).with_rows(rows)).torque_deviation
         for each, rows in ((problem, block), (bare, shown))
@@ -116,18 +98,18 @@ def test_an_effect_that_no_motion_shows_takes_nothing_away() -> None:
 
 def test_the_value_is_the_deviation_of_predicted_torques(problems: list[Problem]) -> None:
     problem = problems[0]
-    block = problem.objective().block(_motion(problem))
+    block = problem.objective().block(drawn(problem, 0.3, 1))
     rows = reference_rows(
         problem.robot, problem.base, np.full(problem.robot.n, 10.0), problem.weighting.rows
     )
     variance = np.einsum("ik,kl,il->i", rows, np.linalg.inv(block.T @ block), rows).mean()
-    value = problem.objective().value(_motion(problem), problem.criterion)
+    value = problem.objective().value(drawn(problem, 0.3, 1), problem.criterion)
     assert value == pytest.approx(0.5 * np.log(variance), rel=1e-7)
 
 
 @pytest.mark.parametrize("effects", ["null", "[{kind: viscous_friction}]"])
 def test_its_gradient_is_exact(effects: str) -> None:
-    problem = load_problem(SMOKE, ["criterion.kind=torque_deviation", f"effects={effects}"])
+    problem = smoke("criterion.kind=torque_deviation", f"effects={effects}")
     errors = check_gradient(problem)
     assert errors.relative_error["adjoint_vs_central"] < 1e-7
     assert errors.relative_error["adjoint_vs_block"] < 1e-10
@@ -149,3 +131,24 @@ def test_no_design_over_states_is_better_than_the_free_one(problems: list[Proble
         assert design.efficiency(y.T @ y, len(q)) < bound
     same = design.efficiency(7.0 * design.information, 7.0)
     assert same == pytest.approx(1.0)
+
+
+def test_it_is_the_condition_number_of_eight_times_as_many_rows() -> None:
+    problem = smoke("sampling.cost={samples: 20, step: 0.3}")
+    alpha = drawn(problem, 0.2, 1)
+    times = np.arange(160) * 0.3 / 8
+    basis = problem.trajectory.basis(times)
+    rows = replace(problem, cost_basis=basis).objective().block(alpha)
+    dense = dense_condition_number(problem, Stack.empty(problem.columns), alpha)
+    assert flattered(5.0, 5.2)
+    assert not flattered(5.0, 5.05)
+    assert not flattered(5.0, None)
+    assert dense == pytest.approx(condition_number(singular_values(rows)), rel=1e-9)
+
+
+def test_earlier_motions_count_as_much_as_on_the_samples() -> None:
+    problem = smoke("sampling.cost={samples: 120, step: 0.05}")
+    first, second = drawn(problem, 0.2, 1), drawn(problem, 0.2, 2)
+    stack = Stack.empty(problem.columns).with_rows(problem.objective().block(first))
+    coarse = problem.objective(stack).stacked_condition_number(second)
+    assert dense_condition_number(problem, stack, second) == pytest.approx(coarse, rel=0.01)

@@ -1,28 +1,34 @@
-"""Ways round obstacles: free on a finer grid, and found where brute force says there is one."""
+"""Ways round obstacles, and from the robot's posture into a motion and back.
+
+Ways are free on a finer grid, and found where brute force says there is one; programs are without
+a jump, at rest at their ends, and keep all constraints.
+"""
 
 from collections import deque
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from excite_cli.config.load import load_spec
+from excite_cli.config.trajectory_spec import BSplineSpec
 from excite_cli.constraints.base import Array
 from excite_cli.constraints.keep_out import KeepOut, Region
-from excite_cli.errors import NoAdmissibleMotionError
+from excite_cli.dynamics.forward_kinematics import States
+from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.excitation import path_search
 from excite_cli.excitation.admissible import smallest_margins
 from excite_cli.excitation.base_motion import base_motion
-from excite_cli.excitation.generate import generate_motion
+from excite_cli.excitation.connection import State, joined_states, judge_of
+from excite_cli.excitation.entry import program
 from excite_cli.excitation.path_search import FreeSpace, find_way, standing_margins
-from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.excitation.solvers.interior_point import InteriorPoint
-from excite_cli.excitation.stack import Stack
+from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.task import MotionTask
+from excite_cli.trajectory.base import Trajectory
+from excite_cli.trajectory.fade import Chain, Fade, Segment
+from excite_cli.trajectory.point_to_point import PointToPoint
+from tests.excitation.smoke import one_motion, smoke
 
-CONFIG = Path(__file__).parents[2] / "configs" / "smoke.yaml"
 # A table with a wall across it: the arm, low on one side, is to come down on the other.
 TABLE = (
     "constraints.surroundings={floor: -0.3, margin: 0.01, boxes: "
@@ -33,11 +39,10 @@ ACROSS = (
     "start: {shoulder_yaw: -1.3, shoulder_pitch: 1.3, elbow: 0.4}, "
     "end: {shoulder_yaw: 1.2, shoulder_pitch: 1.3, elbow: 0.4}}"
 )
-BRIEF = ("sampling={}", "optimizer.max_iterations=15")
 
 
 def _problem(*settings: str) -> Problem:
-    return build_problem(load_spec(CONFIG, [*BRIEF, *settings]), CONFIG.parent)
+    return smoke("sampling={}", "optimizer.max_iterations=12", *settings)
 
 
 @pytest.fixture(scope="module")
@@ -56,39 +61,30 @@ def test_the_straight_way_is_blocked_and_the_way_found_is_clear(table: Problem) 
     start, end = table.boundary.postures
     straight = standing_margins(table, _fine(np.array([start, end])))
     assert min(margin.min() for margin in straight) < -0.02
-    for seed in range(2):
-        way = find_way(table, start, end, seed).way
+    one, again, other = (find_way(table, start, end, seed).way for seed in (0, 0, 1))
+    for way in (one, other):
         assert way is not None
         assert np.array_equal(way[[0, -1]], [start, end])
         assert min(margin.min() for margin in standing_margins(table, _fine(way))) > 0.0
-
-
-def test_the_same_seed_gives_the_same_way(table: Problem) -> None:
-    start, end = table.boundary.postures
-    one, again, other = (find_way(table, start, end, seed).way for seed in (4, 4, 5))
-    assert one is not None
-    assert again is not None
-    assert np.array_equal(one, again)
+    assert np.array_equal(one, again), "the same seed gives the same way"
     assert not np.array_equal(one, other)
-
-
-def test_a_free_way_is_straight(table: Problem) -> None:
-    start = table.boundary.postures[0]
-    near = start - np.array([0.2, 0.3, 0.1, 0.0, 0.0])
-    search = find_way(table, start, near, 1)
-    assert search.way is not None
-    assert len(search.way) == 2
+    free = find_way(table, start, start - np.array([0.2, 0.3, 0.1, 0.0, 0.0]), 1).way
+    assert free is not None
+    assert len(free) == 2, "a free way is straight"
 
 
 def test_a_motion_round_the_wall_keeps_all_constraints(table: Problem) -> None:
-    solver = InteriorPoint()
-    motion = generate_motion(table, solver, Stack.empty(table.columns), 1, 1, lambda _: None)
+    motion = one_motion(table)
     assert "surroundings" in motion.note
     assert "wall" in motion.note
     times = np.linspace(0.0, 8.0, 8001)
     assert all(m.min() >= 0 for m in smallest_margins(table, motion.coefficients, times))
     q, _, _ = table.trajectory.states(np.array([0.0, 8.0]), motion.coefficients)
-    assert np.abs(q - table.boundary.postures).max() < 1e-9
+    start, end = table.boundary.postures
+    assert np.abs(q - [start, end]).max() < 1e-9
+    chain = program(table, _standing(table, end), start)
+    assert [s.name for s in chain.segments].count("entry") > 1
+    _judge(table, chain, start)
 
 
 def _connected(space: FreeSpace, start: Array, end: Array, cells: int) -> bool:
@@ -139,16 +135,120 @@ def test_it_finds_a_way_where_brute_force_does_and_none_where_there_is_none(
     assert min(counts.values()) >= 2
 
 
-def test_a_closed_off_posture_is_told_with_what_is_between(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_is_closed_off_is_told_with_what_is_between(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(path_search, "_EXTENSIONS", 150)
-    spline = (
-        "trajectory={family: bspline, duration: 6, control_points: 14, start: posture, "
-        "end: {elbow: 1.5}}"
-    )
-    task = MotionTask(_problem(spline, "constraints.keep_out={band: {elbow: [0.95, 1.15]}}"))
+    band = "constraints.keep_out={band: {elbow: [0.95, 1.15]}}"
+    beyond = _problem(SPLINE.format(", start: posture, end: {elbow: 1.5}"), band)
     with pytest.raises(NoAdmissibleMotionError) as error:
-        base_motion(task, 1)
+        base_motion(MotionTask(beyond), 1)
     for words in ("keep_out, band", "of the way", "elbow came to 0.9", "may be disconnected"):
         assert words in str(error.value)
+    problem = _problem(band)
+    posture = problem.robot.posture
+    still = _standing(problem, posture + np.array([0.0, 0.0, 0.7, 0.0, 0.0]))
+    with pytest.raises(NoAdmissibleMotionError, match=r"entry into the motion.*keep_out, band"):
+        program(problem, still, posture)
+    folded = posture + np.array([0.0, 1.5, 1.7, 0.0, 0.0])
+    with pytest.raises(NoAdmissibleMotionError, match=r"posture of the entry.*self_collision"):
+        program(problem, _standing(problem, posture), folded)
+
+
+def _standing(problem: Problem, posture: Array) -> Segment:
+    return Segment("motion", problem.trajectory, problem.trajectory.constant(posture))
+
+
+SPLINE = "trajectory={{family: bspline, duration: 6, control_points: 14{}}}"
+FAMILIES = {
+    "series": "trajectory.at_rest=false",
+    "series at rest": "trajectory.at_rest=true",
+    "spline": SPLINE.format(""),
+    "closed spline": SPLINE.format(", start: posture, end: posture"),
+    "moving spline": SPLINE.format(", at_rest: false"),
+}
+
+
+def _motion(problem: Problem) -> Segment:
+    if isinstance(problem.spec.trajectory, BSplineSpec) and not problem.trajectory.at_rest:
+        # Slow enough that there is room to gather and to lose speed.
+        points = 0.05 * np.random.default_rng(4).normal(size=(14, problem.robot.n))
+        points[:, -1] *= 0.1
+        return Segment("motion", problem.trajectory, problem.robot.posture + points)
+    return Segment("motion", problem.trajectory, one_motion(problem).coefficients)
+
+
+def _judge(problem: Problem, chain: Chain, posture: Array) -> None:
+    """All that is asked of a program, on a grid of its own."""
+    ends = [
+        (State.of(s.trajectory, s.coefficients, 0.0),
+         State.of(s.trajectory, s.coefficients, s.trajectory.duration))
+        for s in chain.segments
+    ]  # fmt: skip
+    for (_, before), (after, _) in pairwise(ends):
+        assert max(np.abs(getattr(after, x) - getattr(before, x)).max() for x in "qva") < 1e-9
+    assert ends[0][0].at_rest
+    assert ends[-1][1].at_rest
+    assert np.abs(ends[0][0].q - posture).max() < 1e-9
+    assert np.abs(ends[-1][1].q - posture).max() < 1e-9
+    times = np.linspace(0.0, chain.duration, int(1000 * chain.duration))
+    q, v, a = chain.states(times)
+    states = States(problem.kinematics, q, v, a)
+    for constraint in problem.constraints:
+        assert constraint.margins(states).min() > -1e-9, constraint.name
+    assert np.abs(np.gradient(q, times, axis=0)[1:-1] - v[1:-1]).max() < 1e-3
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_program_is_smooth_at_rest_at_its_ends_and_admissible(family: str) -> None:
+    problem = _problem(FAMILIES[family])
+    motion = _motion(problem)
+    periods = 1 if family in ("spline", "moving spline") else 3
+    other = problem.robot.posture + np.array([0.5, -0.4, 0.3, 1.0, 0.02])
+    for posture in (problem.robot.posture, other):
+        chain = program(problem, motion, posture, periods)
+        names = [segment.name for segment in chain.segments]
+        assert names.count("motion") == periods
+        starts_there = family == "closed spline" and posture is problem.robot.posture
+        assert (names[0] == "entry") is not starts_there
+        assert (names[-1] == "return") is not starts_there
+        _judge(problem, chain, posture)
+    alone = program(problem, motion, other, with_return=False)
+    assert alone.segments[-1] is motion
+
+
+def test_a_judge_decides_and_the_motion_swells_where_no_polynomial_will_do() -> None:
+    problem = _problem(FAMILIES["series"])
+    motion, asked = _motion(problem), judge_of(problem)
+
+    def no_catching_up(trajectory: Trajectory, coefficients: Array) -> str | None:
+        moving = np.abs(coefficients[[1, 2, 4, 5]]).max() > 1e-9
+        if isinstance(trajectory, PointToPoint) and moving:
+            return "a rule of this test"
+        return asked(trajectory, coefficients)
+
+    posture = problem.robot.posture
+    chain = program(problem, motion, posture, 2, judge=no_catching_up)
+    fades = [s for s in chain.segments if isinstance(s.trajectory, Fade)]
+    assert [s.name for s in fades] == ["entry", "return"]
+    _judge(problem, chain, posture)
+    with pytest.raises(NoAdmissibleMotionError, match="No admissible entry"):
+        program(problem, motion, posture, judge=lambda *_: "a rule of this test")
+
+
+def test_the_quickest_polynomial_is_near_a_bound() -> None:
+    problem = _problem("constraints.torque=null")
+    start = problem.robot.posture
+    end = start + np.array([1.0, 0.2, -0.3, 0.0, 0.0])
+    piece = joined_states(
+        problem, judge_of(problem), "entry", State.resting(start), State.resting(end)
+    )
+    times = np.linspace(0.0, piece.trajectory.duration, 4001)
+    _, v, a = piece.trajectory.states(times, piece.coefficients)
+    used = max(np.abs(v / problem.robot.limits.velocity).max(), np.abs(a).max() / 10.0)
+    assert 1 / 1.15**2 < used <= 1.0
+
+
+def test_what_does_not_close_is_not_repeated() -> None:
+    problem = _problem(ACROSS)
+    moving = Segment("motion", problem.trajectory, problem.boundary.offset)
+    with pytest.raises(ConfigError, match="does not end as it begins"):
+        program(problem, moving, problem.boundary.postures[0], periods=2)

@@ -1,3 +1,5 @@
+"""Solvers against each other, and corrections of motions that are slightly broken."""
+
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -6,21 +8,26 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from benchmarks.slsqp import BestAdmissible, ScipySlsqp
-from excite_cli.config.constraints_spec import ConstraintsSpec, JointLimitsSpec, TorqueSpec
 from excite_cli.config.load import parse_spec
-from excite_cli.config.robot_spec import RobotSpec
-from excite_cli.config.spec import Spec
-from excite_cli.config.trajectory_spec import FourierSpec, GridSpec, SamplingSpec
 from excite_cli.constraints.base import Array
-from excite_cli.excitation.correction import lowest
+from excite_cli.excitation.correction import (
+    chosen_rows,
+    corrected,
+    dips,
+    gathered,
+    least_distance,
+    lowest,
+)
 from excite_cli.excitation.motion import Outcome
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.progress import Measure, Progress, Status
+from excite_cli.excitation.residuals import REACH
 from excite_cli.excitation.solvers.base import Effort, Solver
 from excite_cli.excitation.solvers.interior_point import InteriorPoint, damped_update
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import clear_posture, random_start
 from excite_cli.excitation.task import MotionTask
+from tests.excitation.smoke import task_of
 
 MAKERS: dict[str, Callable[[], Solver]] = {
     "interior_point": InteriorPoint,
@@ -41,22 +48,17 @@ constraints:
   self_collision: {capsules: auto, margin: 0.01}
 """
 every_solver = pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
+UR10 = """
+robot: {urdf: example-robot-data:ur10}
+trajectory: {harmonics: 3}
+sampling: {cost: {samples: 20, step: 0.4}, constraints: {samples: 80, step: 0.1}}
+constraints: {joint_limits: {acceleration: 4.0}, torque: {scale: 0.8}}
+"""
 
 
 @pytest.fixture(scope="module")
 def problem() -> Problem:
-    return build_problem(
-        Spec(
-            robot=RobotSpec(urdf="example-robot-data:ur10"),
-            trajectory=FourierSpec(harmonics=3),
-            sampling=SamplingSpec(
-                cost=GridSpec(samples=20, step=0.4), constraints=GridSpec(samples=80, step=0.1)
-            ),
-            constraints=ConstraintsSpec(
-                joint_limits=JointLimitsSpec(acceleration=4.0), torque=TorqueSpec(scale=0.8)
-            ),
-        )
-    )
+    return build_problem(parse_spec(UR10))
 
 
 def start(task: MotionTask, seed: int = 1) -> Array:
@@ -68,28 +70,12 @@ def solved(
 ) -> tuple[Outcome, list[Progress]]:
     seen: list[Progress] = []
     outcome = solver.solve(task, start(task), Effort(iterations, seconds, 1e-3), seen.append)
+    assert lowest(task.values(task.states(outcome.x))) > 0
     return outcome, seen
 
 
 def condition_number(task: MotionTask, x: Array) -> float:
     return task.objective.stacked_condition_number(task.coefficients(x))
-
-
-@every_solver
-def test_outcome_is_admissible_and_far_better_than_its_start(
-    problem: Problem, make: Callable[[], Solver]
-) -> None:
-    task = MotionTask(problem)
-    outcome, _ = solved(task, make())
-    assert lowest(task.values(task.states(outcome.x))) > 0
-    assert condition_number(task, outcome.x) < 0.5 * condition_number(task, start(task))
-
-
-@every_solver
-def test_same_start_gives_the_same_outcome(problem: Problem, make: Callable[[], Solver]) -> None:
-    first, _ = solved(MotionTask(problem), make(), iterations=8)
-    second, _ = solved(MotionTask(problem), make(), iterations=8)
-    np.testing.assert_array_equal(first.x, second.x)
 
 
 @every_solver
@@ -100,30 +86,27 @@ def test_max_iterations_and_progress(problem: Problem, make: Callable[[], Solver
     assert [progress.iteration for progress in seen] == [1, 2, 3, 4, 5]
     assert all(1 <= progress.stage.number <= progress.stage.total for progress in seen)
     assert {progress.figure.measure for progress in seen} == {Measure.CONDITION_NUMBER}
+    again, _ = solved(MotionTask(problem), make(), iterations=5)
+    np.testing.assert_array_equal(outcome.x, again.x)
 
 
 @every_solver
 def test_no_time_at_all_still_gives_an_admissible_outcome(
     problem: Problem, make: Callable[[], Solver]
 ) -> None:
+    assert solved(MotionTask(problem), make(), seconds=0.02)[0].status is Status.TIME_LIMIT
+
+
+def test_solvers_agree_on_how_good_a_motion_can_be(problem: Problem) -> None:
+    """Far better than the start, and admissible, after a few steps already."""
     task = MotionTask(problem)
-    outcome, _ = solved(task, make(), seconds=0.02)
-    assert outcome.status is Status.TIME_LIMIT
-    assert lowest(task.values(task.states(outcome.x))) > 0
-
-
-@pytest.fixture(scope="module")
-def reference(problem: Problem) -> float:
-    task = MotionTask(problem)
-    return condition_number(task, solved(task, InteriorPoint(), 120)[0].x)
-
-
-@every_solver
-def test_solvers_agree_on_how_good_a_motion_can_be(
-    problem: Problem, reference: float, make: Callable[[], Solver]
-) -> None:
-    task = MotionTask(problem)
-    assert condition_number(task, solved(task, make(), 120)[0].x) < 1.25 * reference
+    ends = []
+    for make in MAKERS.values():
+        for iterations in (25, 120):
+            x = solved(task, make(), iterations)[0].x
+            assert condition_number(task, x) < 0.5 * condition_number(task, start(task))
+        ends.append(condition_number(task, x))
+    assert ends[1] < 1.25 * ends[0]
 
 
 @every_solver
@@ -151,13 +134,12 @@ def test_restoration_brings_a_broken_motion_inside(problem: Problem) -> None:
     assert condition_number(task, best.kept()) < condition_number(task, x)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_damped_update_stays_positive_definite(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    hessian = np.eye(6)
-    for _ in range(20):
-        hessian = damped_update(hessian, rng.normal(size=6), rng.normal(size=6))
-        assert np.linalg.eigvalsh(hessian).min() > 0
+def test_damped_update_stays_positive_definite() -> None:
+    for seed in range(5):
+        rng, hessian = np.random.default_rng(seed), np.eye(6)
+        for _ in range(20):
+            hessian = damped_update(hessian, rng.normal(size=6), rng.normal(size=6))
+            assert np.linalg.eigvalsh(hessian).min() > 0
 
 
 def test_stages_that_are_run_one_by_one_lead_as_far_as_all_at_once(problem: Problem) -> None:
@@ -180,11 +162,51 @@ def test_motions_pass_where_a_constraint_bends_along_the_way() -> None:
 
     With curvature of the criterion alone this start ended at 20.9.
     """
-    spec = parse_spec(PANDA)
-    panda = build_problem(spec)
-    task = MotionTask(panda)
+    task = MotionTask(build_problem(parse_spec(PANDA)))
+    effort = Effort(1000, 60.0, 1e-3)
     with threadpool_limits(1):
-        found = InteriorPoint().solve(
-            task, start(task, 1), Effort(1000, 60.0, 1e-3), lambda told: None
-        )
+        found = InteriorPoint().solve(task, start(task, 1), effort, lambda told: None)
     assert condition_number(task, found.x) < 9.5
+
+
+def test_chosen_rows_match_differences() -> None:
+    task = task_of()
+    x = random_start(task, clear_posture(task, 1), (1, 1, 0))
+    direction = np.random.default_rng(3).normal(size=task.size)
+    states = task.states(x)
+    near = [value < REACH for value in task.values(states)]
+    assert all(mask.any() for mask in near)
+    h = 1e-6
+    ahead, behind = (task.values(task.states(x + s * h * direction)) for s in (1, -1))
+    differences = [(a - b) / (2 * h) for a, b in zip(ahead, behind, strict=True)]
+    found = chosen_rows(task, states, near) @ direction
+    np.testing.assert_allclose(found, gathered(differences, near), atol=1e-6)
+
+
+def test_a_slightly_broken_motion_is_brought_inside() -> None:
+    task = task_of()
+    x = random_start(task, clear_posture(task, 1), (1, 1, 0))
+    resting = task.variables(task.problem.still(task.problem.robot.posture))
+    share = next(s for s in np.arange(1.0, 3.0, 0.02)
+                 if lowest(task.values(task.states(resting + s * (x - resting)))) < 0)  # fmt: skip
+    broken = resting + share * (x - resting)
+    mended = corrected(task, broken)
+    assert mended is not None
+    assert lowest(task.values(task.states(mended))) > 0
+    assert np.linalg.norm(mended - broken) < 0.1 * np.linalg.norm(broken - resting)
+
+
+def test_least_distance_is_the_projection_onto_the_rows() -> None:
+    rows = np.array([[1.0, 0.0], [1.0, 1.0], [0.0, -1.0]])
+    found = least_distance(rows, np.array([0.5, 1.0, -2.0]))
+    assert found is not None
+    np.testing.assert_allclose(found, [0.5, 0.5], atol=1e-12)
+    inside = least_distance(rows, np.array([-1.0, -1.0, -1.0]))
+    assert inside is not None
+    np.testing.assert_allclose(inside, 0.0, atol=1e-12)
+    assert least_distance(np.array([[1.0, 0.0], [-1.0, 0.0]]), np.ones(2)) is None
+
+
+def test_dips_are_found_at_the_ends_too() -> None:
+    value = np.array([[0.0], [1.0], [0.5], [0.7], [0.2]])
+    np.testing.assert_array_equal(dips(value)[:, 0], [True, False, True, False, True])

@@ -1,23 +1,18 @@
 """A slowed motion keeps its share of the limits at every instant, and is no slower than that."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from excite_cli.config.load import load_spec
-from excite_cli.constraints.catalogue import build_constraints
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.time_scaling import PaceLimits, slowing
-from excite_cli.robot.model import build_robot
 from excite_cli.trajectory.base import Trajectory
 from excite_cli.trajectory.bspline import BSplineTrajectory
 from excite_cli.trajectory.fourier import FourierTrajectory
 from excite_cli.trajectory.sampled import SampledTrajectory
+from tests.excitation.smoke import smoke
 
-CONFIG = Path(__file__).parents[2] / "configs" / "smoke.yaml"
 FAMILIES: list[Trajectory] = [
     FourierTrajectory(5, 0.8),
     BSplineTrajectory(6.0, 12),
@@ -53,23 +48,22 @@ def test_a_motion_that_is_slow_enough_is_not_sped_up() -> None:
 
 
 def test_limits_are_those_of_the_constraints() -> None:
-    spec = load_spec(CONFIG, ["constraints.joint_limits={acceleration: 7, velocity: 0.9}"])
-    robot = build_robot(spec.robot, CONFIG.parent)
-    only = spec.constraints.model_copy(update={"self_collision": None, "torque": None})
-    limits = PaceLimits.of(build_constraints(only, robot), robot.n)
+    problem = smoke("constraints.joint_limits={acceleration: 7, velocity: 0.9}")
+    robot = problem.robot
+    limits = PaceLimits.of(problem.constraints, robot.n)
     assert limits.velocity == pytest.approx(np.minimum(robot.limits.velocity, 0.9))
     assert limits.acceleration == pytest.approx(np.full(robot.n, 7.0))
     assert np.isinf(PaceLimits.of((), 2).velocity).all()
 
 
-@pytest.mark.parametrize("share", [0.0, -1.0, 1.01, float("nan")])
-def test_shares_that_cannot_be(share: float) -> None:
-    limits = PaceLimits(np.ones(1), np.ones(1))
-    with pytest.raises(ConfigError, match=r"share of the limits from 0\.001 to 1"):
+@pytest.mark.parametrize(
+    ("share", "limit", "words"),
+    [
+        *((share, 1.0, r"share of the limits from 0\.001 to 1") for share in (0.0, 1.01, np.nan)),
+        (0.5, np.inf, "no limits of speed or acceleration"),
+    ],
+)
+def test_what_cannot_be_kept(share: float, limit: float, words: str) -> None:
+    limits = PaceLimits(np.full(1, limit), np.full(1, limit))
+    with pytest.raises(ConfigError, match=words):
         slowing(limits, FourierTrajectory(2, 1.0), np.ones((5, 1)), share)
-
-
-def test_without_limits_there_is_nothing_to_keep() -> None:
-    limits = PaceLimits(np.full(1, np.inf), np.full(1, np.inf))
-    with pytest.raises(ConfigError, match="no limits of speed or acceleration"):
-        slowing(limits, FourierTrajectory(2, 1.0), np.ones((5, 1)), 0.5)

@@ -15,11 +15,12 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.effects.viscous_friction import ViscousFriction
-from excite_cli.export.c_model import c_model
+from excite_cli.export.c_model import c_model, filled
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.regression import Series
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot, build_robot
+from excite_cli.scoring.thresholds import Residual, Thresholds
 from tests.docs.test_predict import PLANTED as ON_JOINTS
 from tests.robot.coupled_robots import CLAW, HAND, coupled_robot
 from tests.robot.random_robots import random_robot
@@ -86,11 +87,16 @@ def planted(kinds: Sequence[str] | None = None) -> tuple[tuple[Effect, ...], Arr
     return tuple(effects), np.concatenate([np.asarray(row[3], dtype=float) for row in rows])
 
 
+def of_ur10(kinds: Sequence[str] | None = None) -> tuple[Robot, IdentifiedModel]:
+    robot = build_robot(UR10)
+    return robot, IdentifiedModel(standard_parameters(robot), *planted(kinds))
+
+
 def test_all_kinds_have_code() -> None:
     assert {row[0] for row in PLANTED} == set(catalogue())
     silent = {
         effect.kind
-        for effect in planted(list(catalogue()))[0]
+        for effect in planted()[0]
         if not (effect.carried or effect.in_c(np.ones(len(effect.parameters)), ("temp",)))
         and not effect.in_c_series(np.ones(len(effect.parameters)))
     }
@@ -99,31 +105,28 @@ def test_all_kinds_have_code() -> None:
 
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_all_effects_at_once(compiler: str, tmp_path: Path) -> None:
-    robot = build_robot(UR10)
-    effects, values = planted()
-    model = IdentifiedModel(standard_parameters(robot), effects, values)
+    robot, model = of_ur10()
     series = series_of(robot, columns=("temp",))
-    expected = model.predicted(robot, series).torque
-    library = compiled(c_model(robot, model).text, tmp_path, compiler)
-    assert relative(by_c(library, series), expected) < 1e-9
+    text = c_model(robot, model).text
+    library = compiled(text, tmp_path, compiler)
+    assert relative(by_c(library, series), model.predicted(robot, series).torque) < 1e-9
     library.excite_self_test.restype = ctypes.c_double
     assert library.excite_self_test() < 1e-9
+    assert "excite_detector_begin" not in text, "without thresholds there is none"
+    assert "@" not in text.replace("(at)", "")
 
 
 @pytest.mark.parametrize("kind", sorted(catalogue()))
 def test_every_effect_alone(kind: str, tmp_path: Path) -> None:
-    robot = build_robot(UR10)
-    effects, values = planted([kind])
-    model = IdentifiedModel(standard_parameters(robot), effects, values)
-    follows = effects[0].follows_covariate
-    series = series_of(robot, columns=("temp",) if follows else ())
+    robot, model = of_ur10([kind])
+    series = series_of(robot, columns=("temp",) if model.effects[0].follows_covariate else ())
     rigid = IdentifiedModel(model.phi).predicted(robot, series).torque
     expected = model.predicted(robot, series).torque
     library = compiled(c_model(robot, model).text, tmp_path, COMPILERS[0], level="-O0")
-    found = by_c(library, series)
     effect = np.abs(expected - rigid).max()
     assert effect > 0.0
-    assert np.abs(found - expected).max() < 1e-9 * max(effect, np.abs(expected).max() * 1e-2)
+    off = np.abs(by_c(library, series) - expected).max()
+    assert off < 1e-9 * max(effect, np.abs(expected).max() * 1e-2)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -147,9 +150,7 @@ def _assert_by_c(robot: Robot, j: int, tmp_path: Path) -> None:
 
 
 def test_single_precision(tmp_path: Path) -> None:
-    robot = build_robot(UR10)
-    effects, values = planted(["viscous_friction", "spring", "dahl_friction", "payload"])
-    model = IdentifiedModel(standard_parameters(robot), effects, values)
+    robot, model = of_ur10(["viscous_friction", "spring", "dahl_friction", "payload"])
     series = series_of(robot)
     library = compiled(c_model(robot, model).text, tmp_path, COMPILERS[0], "-DEXCITE_FLOAT")
     found = by_c(library, series, ctypes.c_float)
@@ -158,26 +159,14 @@ def test_single_precision(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_no_bound_is_broken(compiler: str, tmp_path: Path) -> None:
-    robot = build_robot(UR10)
-    effects, values = planted()
-    model = IdentifiedModel(standard_parameters(robot), effects, values)
+    robot, model = of_ur10()
     source, program = tmp_path / "model.c", tmp_path / "model"
     source.write_text(c_model(robot, model).text, encoding="utf-8")
-    flags = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", "-O1"]
-    command = [
-        compiler,
-        *STRICT,
-        *flags,
-        "-DEXCITE_MAIN",
-        "-DEXCITE_CALLS=500",
-        str(source),
-        "-o",
-        str(program),
-        "-lm",
-    ]
-    built = subprocess.run(command, capture_output=True, text=True)
+    command = [compiler, *STRICT, "-g", "-O1", "-DEXCITE_MAIN", "-DEXCITE_CALLS=500"]
+    command += [str(source), "-o", str(program), "-lm"]
+    flags = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    built = subprocess.run([*command, *flags], capture_output=True, text=True)
     if "cannot find" in built.stderr:  # the compiler came without its sanitizers
-        command = [each for each in command if each not in flags[:2]]
         built = subprocess.run(command, capture_output=True, text=True)
     assert built.returncode == 0, built.stderr
     ran = subprocess.run([str(program)], capture_output=True, text=True)
@@ -186,11 +175,8 @@ def test_no_bound_is_broken(compiler: str, tmp_path: Path) -> None:
 
 
 def test_step_by_step_is_the_series_where_nothing_looks_ahead(tmp_path: Path) -> None:
-    robot = build_robot(UR10)
-    effects, values = planted(
-        ["coulomb_friction", "dahl_friction", "friction_drift", "torque_gain"]
-    )
-    model = IdentifiedModel(standard_parameters(robot), effects, values)
+    kinds = ["coulomb_friction", "dahl_friction", "friction_drift", "torque_gain"]
+    robot, model = of_ur10(kinds)
     series = series_of(robot)
     library = compiled(c_model(robot, model).text, tmp_path, COMPILERS[0])
     memory = ctypes.create_string_buffer(8 * 20 * robot.n + 256)
@@ -220,3 +206,39 @@ def test_effects_of_single_recordings_are_left_out_and_told() -> None:
     found = c_model(robot, IdentifiedModel(standard_parameters(robot), (payload, unknown), values))
     assert "only some recordings had them: payload at wrist_3_joint" in found.notes[0]
     assert "C has no code for: unknown at elbow_joint" in found.notes[1]
+
+
+def thresholds(robot: Robot) -> Thresholds:
+    rng = np.random.default_rng(3)
+    rows = rng.uniform(0.01, 1.0, (robot.n, 4))
+    return Thresholds(robot.joint_names, rows, rng.uniform(3.0, 9.0, robot.n), 2.0, 0.03)
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_the_detector_says_what_the_thresholds_say(compiler: str, tmp_path: Path) -> None:
+    """On a series that its own test does not know."""
+    robot = build_robot(UR10)
+    given, model = thresholds(robot), IdentifiedModel(standard_parameters(robot))
+    library = compiled(c_model(robot, model, thresholds=given).text, tmp_path, compiler)
+    library.excite_detector_self_test.restype = ctypes.c_double
+    assert library.excite_detector_self_test() < 1e-12
+    rng, step = np.random.default_rng(8), 0.004
+    residual = 0.5 * np.cumsum(rng.normal(0.0, 0.4, (300, robot.n)), axis=0)
+    speed, load = rng.normal(0.0, 0.1, (2, 300, robot.n))
+    expected = given.beyond(Residual(residual, speed, load, step))
+    state = (ctypes.c_double * (2 * robot.n + 2))()
+    library.excite_detector_begin(state, ctypes.c_double(step))
+    beyond = np.zeros(robot.n)
+    for k in range(300):
+        rows = [np.ascontiguousarray(x[k]) for x in (residual, speed, load)]
+        pointers = [x.ctypes.data_as(ctypes.c_void_p) for x in (*rows, beyond)]
+        said = library.excite_detect(state, *pointers)
+        assert np.abs(beyond) == pytest.approx(expected[k], rel=1e-12)
+        assert said == int((expected[k] > 1.0).any())
+    spoken = (expected > 1.0).any(axis=1).mean()
+    assert 0.05 < spoken < 0.95
+
+
+def test_what_is_put_in_is_not_filled_again() -> None:
+    gaps = {"ROBOT": "the @N@ of @ROBOT@", "N": "@M@", "M": r"\1 \g<0>"}
+    assert filled("@ROBOT@, @N@, @M@ @X@ @", gaps) == r"the @N@ of @ROBOT@, @M@, \1 \g<0> @X@ @"

@@ -5,6 +5,7 @@ import pytest
 
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import RobotError
@@ -57,8 +58,14 @@ def test_random_trees(seed: int, floating: bool) -> None:
     check(random_robot(seed, joints=5, floating=floating))
 
 
-def test_an_arm() -> None:
-    check(build_robot(RobotSpec(urdf="example-robot-data:ur10")))
+def test_an_arm_with_its_limits_and_names() -> None:
+    robot = build_robot(RobotSpec(urdf="example-robot-data:ur10"))
+    check(robot)
+    text = mjcf(robot, IdentifiedModel(standard_parameters(robot))).text
+    model = mujoco.MjModel.from_xml_string(text)
+    assert [model.joint(j).name for j in range(robot.n)] == list(robot.joint_names)
+    assert model.jnt_range[:, 0] == pytest.approx(robot.limits.lower)
+    assert model.jnt_limited.all()
 
 
 @pytest.mark.parametrize("parts", [HAND, CLAW], ids=["hand", "claw"])
@@ -79,15 +86,6 @@ def test_joints_that_follow_others(parts: tuple) -> None:
     own = [robot.tree.joint_names.index(name) for name in robot.joint_names]
     assert np.abs(data.qpos[own] - robot.posture).max() > 0.01
     np.testing.assert_allclose(data.qpos, robot.all_positions(data.qpos[own]), atol=1e-3)
-
-
-def test_limits_and_names_are_in_it() -> None:
-    robot = random_robot(1, joints=3)
-    phi = true_inertias(robot, 0.3, seed=2)
-    model = mujoco.MjModel.from_xml_string(mjcf(robot, IdentifiedModel(phi)).text)
-    assert [model.joint(j).name for j in range(3)] == list(robot.joint_names)
-    assert model.jnt_range[:, 0] == pytest.approx(robot.limits.lower)
-    assert model.jnt_limited.all()
 
 
 def test_an_impossible_body_is_refused() -> None:

@@ -1,6 +1,7 @@
 """What is not finite is a contact in the C file and enters no memory, also with -ffast-math."""
 
 import ctypes
+import re
 import subprocess
 from itertools import product
 from pathlib import Path
@@ -8,14 +9,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.export.c_model import c_model
-from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.regression import Series
 from excite_cli.robot.model import Array, Robot, build_robot
-from excite_cli.scoring.thresholds import Residual, Thresholds
-from tests.export.test_c_model import COMPILERS, STRICT, UR10, by_c, compiled, planted, series_of
+from excite_cli.scoring.thresholds import Residual
+from tests.export.test_c_model import (
+    COMPILERS,
+    STRICT,
+    UR10,
+    by_c,
+    compiled,
+    of_ur10,
+    series_of,
+    thresholds,
+)
 
 LEVELS = [["-O2"], ["-O3", "-ffast-math"], ["-Ofast"]]
 BUILDS = list(product(COMPILERS, LEVELS))
@@ -36,16 +44,8 @@ def whole(
 ) -> ctypes.CDLL:
     """Every effect at once, and a detector."""
     compiler, level = request.param
-    effects, values = planted()
-    model = IdentifiedModel(standard_parameters(robot), effects, values)
-    text = c_model(robot, model, thresholds=_thresholds(robot)).text
+    text = c_model(*of_ur10(), thresholds=thresholds(robot)).text
     return compiled(text, tmp_path_factory.mktemp("c"), compiler, *level[1:], level=level[0])
-
-
-def _thresholds(robot: Robot) -> Thresholds:
-    rng = np.random.default_rng(3)
-    rows = rng.uniform(0.01, 1.0, (robot.n, 4))
-    return Thresholds(robot.joint_names, rows, rng.uniform(3.0, 9.0, robot.n), 2.0, 0.03)
 
 
 class Detector:
@@ -92,7 +92,7 @@ def _rows(series: Series) -> tuple[Array, ...]:
 
 
 def test_detector_hears_after_a_bad_sample(whole: ctypes.CDLL, robot: Robot) -> None:
-    rng, given = np.random.default_rng(8), _thresholds(robot)
+    rng, given = np.random.default_rng(8), thresholds(robot)
     residual = 0.5 * np.cumsum(rng.normal(0.0, 0.4, (80, robot.n)), axis=0)
     speed, load = rng.normal(0.0, 0.1, (2, 80, robot.n))
     expected = given.beyond(Residual(residual, speed, load, 0.004))
@@ -122,14 +122,11 @@ def test_a_bad_joint_does_not_deafen_the_others(whole: ctypes.CDLL, robot: Robot
         assert detector(still, still, still) == 0
         assert detector(1e6 * np.eye(robot.n)[j], still, still) == 1
         detector.begin(0.004)
-
-
-@pytest.mark.parametrize("step", [*BAD[:3], 0.0, -0.004])
-def test_detector_without_a_step(whole: ctypes.CDLL, robot: Robot, step: float) -> None:
-    detector, still = Detector(whole, robot.n, step), np.zeros(robot.n)
-    assert [detector(still, still, still) for _ in range(3)] == [1, 1, 1]
-    detector.begin(0.004)
-    assert [detector(still, still, still) for _ in range(3)] == [0, 0, 0]
+    for step in (*BAD[:3], 0.0, -0.004):
+        detector.begin(step)
+        assert [detector(still, still, still) for _ in range(3)] == [1, 1, 1], step
+        detector.begin(0.004)
+        assert [detector(still, still, still) for _ in range(3)] == [0, 0, 0]
 
 
 @pytest.mark.parametrize("value", BAD)
@@ -214,13 +211,13 @@ def test_series_with_bad_instants(whole: ctypes.CDLL, robot: Robot, value: float
 
 
 @pytest.mark.parametrize("kind", sorted(catalogue()))
-def test_every_effect_alone_comes_back(kind: str, robot: Robot, tmp_path: Path) -> None:
-    effects, values = planted([kind])
-    model = IdentifiedModel(standard_parameters(robot), effects, values)
-    columns = ("temp",) if effects[0].follows_covariate else ()
+def test_every_effect_alone_comes_back(kind: str, tmp_path: Path) -> None:
+    robot, model = of_ur10([kind])
+    columns = ("temp",) if model.effects[0].follows_covariate else ()
     rows = _rows(series_of(robot, columns=columns))
-    flags = ("-ffast-math",)
-    library = compiled(c_model(robot, model).text, tmp_path, COMPILERS[0], *flags, level="-O3")
+    text, flags = c_model(robot, model).text, ("-ffast-math",)
+    assert re.search(r"What is not finite(?s:.)*is a contact", text[: text.index("*/")])
+    library = compiled(text, tmp_path, COMPILERS[0], *flags, level="-O3")
     for value in BAD:
         sound, hit = Stepper(library, robot.n), Stepper(library, robot.n)
         for k in range(len(rows[0])):
@@ -240,9 +237,8 @@ def test_every_effect_alone_comes_back(kind: str, robot: Robot, tmp_path: Path) 
 def test_the_file_tests_it_itself(
     deaf: str, level: list[str], flags: tuple[str, ...], robot: Robot, tmp_path: Path
 ) -> None:
-    effects, values = planted(["viscous_friction", "dahl_friction", "covariate_friction"])
-    model = IdentifiedModel(standard_parameters(robot), effects, values)
-    text = c_model(robot, model, thresholds=_thresholds(robot)).text
+    _, model = of_ur10(["viscous_friction", "dahl_friction", "covariate_friction"])
+    text = c_model(robot, model, thresholds=thresholds(robot)).text
     if deaf == "all_finite":
         text = text.replace("if ((each.all & EXPONENT) >= SQUARES)", "if (each.all == 1)")
     elif deaf == "rated":
@@ -254,10 +250,3 @@ def test_the_file_tests_it_itself(
     subprocess.run([*command, str(source), "-o", str(program), "-lm"], check=True)
     ran = subprocess.run([str(program)], capture_output=True, text=True)
     assert (ran.returncode == 0) == (deaf == ""), ran.stdout
-
-
-def test_the_header_says_so(robot: Robot) -> None:
-    text = c_model(robot, IdentifiedModel(standard_parameters(robot))).text
-    comment = text[: text.index("*/")]
-    assert "What is not finite" in comment
-    assert "is a contact" in comment

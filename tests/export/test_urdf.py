@@ -8,7 +8,7 @@ from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects, urdf_friction
 from excite_cli.errors import RobotError
-from excite_cli.export.urdf import updated_urdf
+from excite_cli.export.urdf import ModelText, updated_urdf
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.robot.model import Robot, build_robot
 from excite_cli.simulation.build import true_inertias
@@ -91,24 +91,22 @@ def test_the_rest_of_the_file_is_kept(tmp_path: Path) -> None:
     assert text.count("<joint ") == path.read_text().count("<joint ")
 
 
-def test_bodies_of_several_links_are_told() -> None:
+def test_bodies_of_several_links_are_told(tmp_path: Path) -> None:
+    """A lighter one takes all of it when its first link alone cannot."""
     robot = build_robot(TALOS)
-    phi = standard_parameters(robot).copy()
-    last = slice(10 * robot.n_bodies - 10, 10 * robot.n_bodies)
-    phi[last] *= 1.01
-    exported = updated_urdf(robot, IdentifiedModel(phi))
-    assert len(exported.notes) == 1
-    assert "gripper_left_base_link" in exported.notes[0]
-    assert "how it is shared among them does not show" in exported.notes[0]
 
+    def exported(factor: float) -> tuple[np.ndarray, ModelText]:
+        phi = standard_parameters(robot).copy()
+        phi[-10:] *= factor
+        return phi, updated_urdf(robot, IdentifiedModel(phi))
 
-def test_a_lighter_body_takes_all_of_it_when_its_first_link_alone_cannot(tmp_path: Path) -> None:
-    robot = build_robot(TALOS)
-    phi = standard_parameters(robot).copy()
-    phi[-10:] *= 0.05
-    exported = updated_urdf(robot, IdentifiedModel(phi))
-    assert "have lost theirs" in exported.notes[0]
-    again = reloaded(TALOS, exported.text, tmp_path)
+    _, heavier = exported(1.01)
+    assert len(heavier.notes) == 1
+    assert "gripper_left_base_link" in heavier.notes[0]
+    assert "how it is shared among them does not show" in heavier.notes[0]
+    phi, lighter = exported(0.05)
+    assert "have lost theirs" in lighter.notes[0]
+    again = reloaded(TALOS, lighter.text, tmp_path)
     assert standard_parameters(again) == pytest.approx(phi, abs=1e-12)
 
 

@@ -1,3 +1,5 @@
+"""Which pairs of capsules are checked, why others are not, and the words for it."""
+
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,8 +9,22 @@ import pytest
 from excite_cli.config.constraints_spec import SelfCollisionSpec
 from excite_cli.constraints.self_collision import Clearance
 from excite_cli.geometry import collision_pairs
-from excite_cli.geometry.collision_pairs import CollisionPairs, choose_pairs
-from excite_cli.geometry.reasons import Why, reason_in_words
+from excite_cli.geometry.collision_pairs import (
+    CollisionPairs,
+    choose_pairs,
+    store_reasons,
+    stored_reasons,
+)
+from excite_cli.geometry.reasons import (
+    DroppedPair,
+    LinksApart,
+    Reason,
+    Standing,
+    Why,
+    dropped_in_words,
+    reason_in_words,
+    standing_in_words,
+)
 from excite_cli.robot.capsule import Capsule
 
 from .fitted_robots import capsules_of, pairs_of, robot_of
@@ -22,20 +38,19 @@ def reasons(pairs: CollisionPairs) -> dict[frozenset[str], str]:
     }
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_every_pair_is_either_checked_or_dropped(name: str) -> None:
-    capsules, pairs = capsules_of(name), pairs_of(name)
-    count = len(capsules)
-    assert len(pairs.checked) + len(pairs.dropped) == count * (count - 1) // 2
-    checked = {frozenset((capsules[i].name, capsules[j].name)) for i, j in pairs.checked}
-    assert not checked & set(reasons(pairs))
+def checked(name: str) -> set[frozenset[str]]:
+    capsules = capsules_of(name)
+    return {frozenset((capsules[i].name, capsules[j].name)) for i, j in pairs_of(name).checked}
 
 
 @pytest.mark.parametrize(("name", "least"), [("talos", 0.01), ("ur10", 0.01), ("panda", 0.005)])
-def test_the_posture_is_clear(name: str, least: float) -> None:
-    robot = robot_of(name)
-    distances = Clearance(robot, capsules_of(name), pairs_of(name)).distances(robot.posture[None])
-    assert distances.min() > least
+def test_every_pair_is_either_checked_or_dropped(name: str, least: float) -> None:
+    robot, capsules, pairs = robot_of(name), capsules_of(name), pairs_of(name)
+    count = len(capsules)
+    assert len(pairs.checked) + len(pairs.dropped) == count * (count - 1) // 2
+    assert not checked(name) & set(reasons(pairs))
+    distances = Clearance(robot, capsules, pairs).distances(robot.posture[None])
+    assert distances.min() > least, "the posture is clear"
 
 
 def test_reasons() -> None:
@@ -52,20 +67,10 @@ def test_reasons() -> None:
     assert wrist.startswith("unguarded")
     assert "wrist_left_ft_link" in wrist
     assert "arm_left_7_link" not in wrist
-
-
-def test_what_can_really_meet_is_checked() -> None:
-    capsules = capsules_of("talos")
-    checked = {
-        frozenset((capsules[i].name, capsules[j].name)) for i, j in pairs_of("talos").checked
-    }
-    assert frozenset(("arm_left_5_link", "arm_right_5_link")) in checked
-    assert frozenset(("torso_2_link", "arm_right_4_link")) in checked
-    capsules = capsules_of("panda")
-    checked = {
-        frozenset((capsules[i].name, capsules[j].name)) for i, j in pairs_of("panda").checked
-    }
-    assert frozenset(("panda_link0", "panda_hand")) in checked
+    # What can really meet is checked.
+    assert frozenset(("arm_left_5_link", "arm_right_5_link")) in checked("talos")
+    assert frozenset(("torso_2_link", "arm_right_4_link")) in checked("talos")
+    assert frozenset(("panda_link0", "panda_hand")) in checked("panda")
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -82,29 +87,17 @@ def test_pairs_dropped_as_never_near_stay_apart(name: str) -> None:
     assert distances.min() > 0.03
 
 
-def test_ignored_pairs() -> None:
-    robot, capsules = robot_of("panda"), capsules_of("panda")
+def test_pairs_that_are_ignored_and_margins() -> None:
+    """A margin that cannot be kept must make the problem infeasible, not the check vanish."""
+    robot, capsules, usual = robot_of("panda"), capsules_of("panda"), pairs_of("panda")
     spec = SelfCollisionSpec(ignore=(("panda_hand", "panda_link0"),))
-    assert (
-        reasons(choose_pairs(robot, capsules, spec, samples=200))[
-            frozenset(("panda_link0", "panda_hand"))
-        ]
-        == "ignored in the config"
-    )
-
-
-def test_the_choice_depends_on_the_margin() -> None:
-    robot, capsules = robot_of("panda"), capsules_of("panda")
+    found = reasons(choose_pairs(robot, capsules, spec, samples=200))
+    assert found[frozenset(("panda_link0", "panda_hand"))] == "ignored in the config"
     wide = choose_pairs(robot, capsules, SelfCollisionSpec(margin=0.2), samples=500)
     assert (0, 3) in wide.checked  # nearer than 25 cm at times, never nearer than 6 cm
-    assert (0, 3) not in pairs_of("panda").checked
-
-
-def test_a_wide_margin_is_no_contact() -> None:
-    """A margin that cannot be kept must make the problem infeasible, not the check vanish."""
-    robot, capsules = robot_of("panda"), capsules_of("panda")
-    wide = choose_pairs(robot, capsules, SelfCollisionSpec(margin=5.0), samples=500)
-    assert len(wide.checked) >= len(pairs_of("panda").checked)
+    assert (0, 3) not in usual.checked
+    wider = choose_pairs(robot, capsules, SelfCollisionSpec(margin=5.0), samples=500)
+    assert len(wider.checked) >= len(usual.checked)
 
 
 def test_a_pair_that_random_postures_miss_is_found_by_descent() -> None:
@@ -121,11 +114,6 @@ def test_a_pair_that_random_postures_miss_is_found_by_descent() -> None:
     assert Clearance(robot, capsules, pairs).distances(q).min() > 0.06
     chosen = choose_pairs(robot, capsules, SelfCollisionSpec(), samples=60, seed=0)
     assert chosen.checked == ((0, 1),)
-
-
-def test_same_seed_same_pairs() -> None:
-    robot, capsules = robot_of("ur10"), capsules_of("ur10")
-    assert choose_pairs(robot, capsules, SelfCollisionSpec()) == pairs_of("ur10")
 
 
 def test_the_choice_is_kept_and_foreign_content_is_not(
@@ -149,3 +137,40 @@ def test_the_choice_is_kept_and_foreign_content_is_not(
             file.write_bytes(content)
         assert choose_pairs(robot, capsules, spec) == first
     assert len(calls) == 6
+
+
+APART = (LinksApart("base", "arm", 0.5), LinksApart("base – x", "hand, left", 0.995))
+TOLD = [
+    (Reason(Why.SAME_BODY), "same body"),
+    (Reason(Why.IGNORED), "ignored in the config"),
+    (Reason(Why.BY_MESHES), "checked by their meshes, as configured"),
+    (Reason(Why.ADJACENT), "adjacent"),
+    (Reason(Why.OUT_OF_REACH), "out of reach"),
+    (Reason(Why.NEVER_NEAR, 0.1234), "never near (at least 0.12 m found)"),
+    (Reason(Why.MESHES_NEVER_NEAR, 0.1234), "meshes never near (at least 0.123 m found)"),
+    (Reason(Why.ALWAYS_TOUCHING), "always in contact"),
+    (Reason(Why.ALWAYS_TOUCHING, 0.0207), "always in contact (up to 0.021 m deep)"),
+    (Reason(Why.ALWAYS_NEAR, 0.004), "always nearer than the margin (distance at least 0.004 m)"),
+    (
+        Reason(Why.UNGUARDED, 0.05, APART),
+        "unguarded: capsules always overlap (up to 0.050 m deep; meshes separated: base – arm 50%, "
+        "base – x – hand, left 100%)",
+    ),
+]
+
+
+@pytest.mark.parametrize(("reason", "words"), TOLD)
+def test_words(reason: Reason, words: str) -> None:
+    assert reason_in_words(reason) == words
+    assert dropped_in_words(DroppedPair("a", "b", reason)) == f"a – b: {words}"
+
+
+def test_what_is_stored_comes_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    reasons = [None, *(reason for reason, _ in TOLD)]
+    store_reasons("key", reasons)
+    assert stored_reasons("key", len(reasons)) == reasons
+    assert stored_reasons("key", 3) is None
+    assert stored_reasons("other", len(reasons)) is None
+    assert {reason.why for reason, _ in TOLD} == set(Why), "every reason has words"
+    assert [bool(standing_in_words(each)) for each in Standing] == [False, True, True, True]

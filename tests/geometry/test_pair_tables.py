@@ -1,8 +1,6 @@
 """Tabled distances of meshes that capsules cannot tell apart, and the constraint on them."""
 
 import os
-import tempfile
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from unittest import mock
@@ -13,61 +11,52 @@ import pytest
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.constraints.mesh_clearance import KEPT, MeshClearance
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
-from excite_cli.excitation.gradient_check import central_differences
 from excite_cli.geometry.collision_pairs import CollisionPairs
 from excite_cli.geometry.mesh_distances import MeshDistances
 from excite_cli.geometry.pair_table import PairTable
 from excite_cli.geometry.pair_tables import FAR, mesh_tables, near_at_posture
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot, build_robot
+from tests.constraints.test_gradients import check_gradients
+
+
+def _link(name: str, shape: str, place: str = "0 0 0") -> str:
+    moments = 'ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"'
+    return (
+        f'<link name="{name}"><inertial><mass value="1"/><inertia {moments}/></inertial>'
+        f'<collision><origin xyz="{place}"/><geometry><{shape}/></geometry></collision></link>'
+    )
+
+
+def _joint(name: str, ends: tuple[str, str], height: float, axis: str, limits: str) -> str:
+    return (
+        f'<joint name="{name}" type="revolute"><parent link="{ends[0]}"/><child link="{ends[1]}"/>'
+        f'<origin xyz="0 0 {height}"/><axis xyz="{axis}"/><limit {limits} velocity="2" '
+        'effort="5"/></joint>'
+    )
+
 
 # A bar on two crossed hinges above a plate: it strikes the plate when it tilts.
-WRIST = """
-<robot name="wrist">
-  <link name="plate">
-    <inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
-    <collision><geometry><box size="0.2 0.2 0.05"/></geometry></collision>
-  </link>
-  <joint name="roll" type="revolute">
-    <parent link="plate"/><child link="cross"/><origin xyz="0 0 0.06"/><axis xyz="1 0 0"/>
-    <limit lower="-0.9" upper="0.8" velocity="2" effort="5"/>
-  </joint>
-  <link name="cross">
-    <inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
-    <collision><geometry><box size="0.01 0.01 0.01"/></geometry></collision>
-  </link>
-  <joint name="pitch" type="revolute">
-    <parent link="cross"/><child link="bar"/><origin xyz="0 0 0.02"/><axis xyz="0 1 0"/>
-    <limit lower="-0.9" upper="0.9" velocity="2" effort="5"/>
-  </joint>
-  <link name="bar">
-    <inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
-    <collision><origin xyz="0.01 0 0"/><geometry><box size="0.16 0.06 0.02"/></geometry></collision>
-  </link>
-  <joint name="twist" type="revolute">
-    <parent link="bar"/><child link="far"/><origin xyz="0 0 0.5"/><axis xyz="0 0 1"/>
-    <limit lower="-1" upper="1" velocity="2" effort="5"/>
-  </joint>
-  <link name="far">
-    <inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
-    <collision><geometry><sphere radius="0.02"/></geometry></collision>
-  </link>
-</robot>"""
-
+WRIST = "".join(
+    [
+        '<robot name="wrist">',
+        _link("plate", 'box size="0.2 0.2 0.05"'),
+        _joint("roll", ("plate", "cross"), 0.06, "1 0 0", 'lower="-0.9" upper="0.8"'),
+        _link("cross", 'box size="0.01 0.01 0.01"'),
+        _joint("pitch", ("cross", "bar"), 0.02, "0 1 0", 'lower="-0.9" upper="0.9"'),
+        _link("bar", 'box size="0.16 0.06 0.02"', "0.01 0 0"),
+        _joint("twist", ("bar", "far"), 0.5, "0 0 1", 'lower="-1" upper="1"'),
+        _link("far", 'sphere radius="0.02"'),
+        "</robot>",
+    ]
+)
 NONE = CollisionPairs((), ())
 
 
-@pytest.fixture(autouse=True)
-def own_cache() -> Iterator[None]:
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        mock.patch.dict(os.environ, {"XDG_CACHE_HOME": folder}),
-    ):
-        yield
-
-
 @pytest.fixture
-def wrist(tmp_path: Path) -> Robot:
+def wrist(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Robot:
+    """With a cache of its own."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     (tmp_path / "wrist.urdf").write_text(WRIST, encoding="utf-8")
     return build_robot(RobotSpec(urdf="wrist.urdf"), relative_to=tmp_path)
 
@@ -109,24 +98,9 @@ def test_slopes_lead_out_of_contact(wrist: Robot) -> None:
 
 def test_gradients_against_differences(wrist: Robot) -> None:
     constraint = MeshClearance(mesh_tables(wrist, (), NONE))
-    kinematics = BatchKinematics(wrist)
-    q, v, a = wrist.draw_states(30, 11)
-    states = States(kinematics, q, v, a)
-    margins = constraint.margins(states)
-    assert margins.shape == (30, len(constraint.labels)) == (30, len(constraint.scale))
-    times = np.arange(30)
-    found, by_v, by_a = constraint.gradients(states, times, np.zeros(30, dtype=np.intp))
-    assert found is not None
-    assert by_v is None
-    assert by_a is None
-    for t in times:
-
-        def margin(x: np.ndarray, t: int = t) -> float:
-            at = States(kinematics, x[None], v[t : t + 1], a[t : t + 1])
-            return float(constraint.margins(at)[0, 0])
-
-        expected = central_differences(margin, q[t], 1e-6)
-        assert np.abs(found[t] - expected).max() < 1e-6 * (1 + np.abs(expected).max())
+    check_gradients(wrist, constraint, 11, 1e-6)
+    states = States(BatchKinematics(wrist), *wrist.draw_states(30, 11))
+    found, _, _ = constraint.gradients(states, np.arange(30), np.zeros(30, dtype=np.intp))
     assert np.abs(found[:, 2]).max() == 0.0  # the third joint is not between them
 
 

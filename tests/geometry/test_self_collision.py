@@ -29,19 +29,15 @@ def spread(name: str) -> tuple[Clearance, CoalGradients, np.ndarray]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_distances_equal_coal(name: str) -> None:
+def test_distances_and_gradients_equal_coal_and_differences(name: str) -> None:
     ours, coal, q = spread(name)
     distances = ours.distances(q)
     assert distances.shape == (40, ours.n_pairs)
     assert (distances < 0).any()
     np.testing.assert_allclose(distances, coal.distances(q), atol=1e-9)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_gradients_equal_coal_and_differences(name: str) -> None:
-    ours, coal, q = spread(name)
     rng = np.random.default_rng(0)
     rows, cols = rng.integers(0, len(q), 120), rng.integers(0, ours.n_pairs, 120)
+    np.testing.assert_allclose(ours.distances_at(q, rows, cols), distances[rows, cols], atol=1e-14)
     gradients = ours.gradients(q, rows, cols)
     np.testing.assert_allclose(gradients, coal.gradients(q, rows, cols), atol=1e-9)
     step = 1e-6
@@ -50,35 +46,20 @@ def test_gradients_equal_coal_and_differences(name: str) -> None:
         shift[joint] = step
         numeric = (ours.distances(q + shift) - ours.distances(q - shift))[rows, cols] / (2 * step)
         np.testing.assert_allclose(gradients[:, joint], numeric, atol=1e-6)
-
-
-def test_distances_at_are_those_of_the_whole_table() -> None:
-    ours, _, q = spread("panda")
-    rows, cols = np.array([3, 3, 17]), np.array([0, 5, 2])
-    some = ours.distances_at(q, rows, cols)
-    np.testing.assert_allclose(some, ours.distances(q)[rows, cols], atol=1e-14)
-
-
-def test_a_changed_array_is_computed_anew() -> None:
-    ours, _, q = spread("ur10")
-    before = ours.distances(q)
     q[:] += 0.3  # in place: the kept placements must not be used
-    assert np.abs(ours.distances(q) - before).max() > 1e-3
-
-
-def test_names_are_those_of_the_columns() -> None:
-    clearance = Clearance(robot_of("ur10"), capsules_of("ur10"), pairs_of("ur10"))
-    first = pairs_of("ur10").checked[0]
-    assert clearance.names[0] == tuple(capsules_of("ur10")[k].name for k in first)
-    assert len(clearance.names) == clearance.n_pairs
+    assert np.abs(ours.distances(q) - distances).max() > 1e-3
 
 
 def test_no_pairs() -> None:
-    robot = robot_of("ur10")
-    empty = Clearance(robot, capsules_of("ur10"), CollisionPairs((), ()))
+    robot, capsules = robot_of("ur10"), capsules_of("ur10")
+    empty = Clearance(robot, capsules, CollisionPairs((), ()))
     assert empty.distances(np.zeros((3, 6))).shape == (3, 0)
     none = np.zeros(0, dtype=np.intp)
     assert empty.gradients(np.zeros((3, 6)), none, none).shape == (0, 6)
+    some = Clearance(robot, capsules, pairs_of("ur10"))
+    first = pairs_of("ur10").checked[0]
+    assert some.names[0] == tuple(capsules[k].name for k in first)
+    assert len(some.names) == some.n_pairs
 
 
 def test_continuous_through_contact_and_falling_beyond() -> None:

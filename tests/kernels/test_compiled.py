@@ -28,10 +28,6 @@ from tests.robot.coupled_robots import CLAW, HAND, coupled_robot
 from tests.robot.random_robots import random_robot
 
 ROBOTS = st.tuples(st.integers(0, 10_000), st.integers(2, 9), st.booleans())
-COUPLED = pytest.mark.parametrize(
-    "robot", [coupled_robot(HAND), coupled_robot(CLAW, base="floating")], ids=["hand", "claw"]
-)
-
 pytestmark = pytest.mark.skipif(
     KERNELS is None and shutil.which("cc") is None, reason="no C compiler on this machine"
 )
@@ -46,16 +42,25 @@ def test_a_library_of_another_version_is_not_taken(monkeypatch: pytest.MonkeyPat
     assert kernels._loaded() is None
 
 
+COUPLED = [coupled_robot(HAND), coupled_robot(CLAW, base="floating")]
+
+
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(ROBOTS)
-def test_kinematics_and_pull_back(chosen: tuple[int, int, bool]) -> None:
+def test_loops_over_random_robots(chosen: tuple[int, int, bool]) -> None:
     seed, joints, floating = chosen
-    _assert_pull_back(random_robot(seed, joints, floating), seed)
+    _assert_alike(random_robot(seed, joints, floating), seed)
 
 
-@COUPLED
-def test_kinematics_and_pull_back_where_joints_follow(robot: Robot) -> None:
-    _assert_pull_back(robot, 1)
+@pytest.mark.parametrize("robot", COUPLED, ids=["hand", "claw"])
+def test_loops_where_joints_follow(robot: Robot) -> None:
+    _assert_alike(robot, 1)
+
+
+def _assert_alike(robot: Robot, seed: int) -> None:
+    _assert_pull_back(robot, seed)
+    _assert_regressor(robot, seed)
+    _assert_distances(robot, seed)
 
 
 def _assert_pull_back(robot: Robot, seed: int) -> None:
@@ -73,36 +78,12 @@ def _assert_pull_back(robot: Robot, seed: int) -> None:
         np.testing.assert_allclose(one, other, atol=1e-11 * (1 + np.abs(other).max()))
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
-@given(ROBOTS)
-def test_regressor_is_pinocchios(chosen: tuple[int, int, bool]) -> None:
-    seed, joints, floating = chosen
-    _assert_regressor(random_robot(seed, joints, floating), seed)
-
-
-@COUPLED
-def test_regressor_is_pinocchios_where_joints_follow(robot: Robot) -> None:
-    _assert_regressor(robot, 1)
-
-
 def _assert_regressor(robot: Robot, seed: int) -> None:
     states = robot.draw_states(7, seed)
     kept = np.random.default_rng(seed).permutation(10 * robot.n_bodies)[: 4 * robot.n_bodies]
     found = SpatialAdjoint(robot).regressor(*states, kept)
     known = Regressor(robot).evaluate(*states)[:, :, kept]
     np.testing.assert_allclose(found, known, atol=1e-12 * (1 + np.abs(known).max()))
-
-
-@settings(max_examples=25, deadline=None, derandomize=True)
-@given(ROBOTS)
-def test_distances_and_their_gradients(chosen: tuple[int, int, bool]) -> None:
-    seed, joints, floating = chosen
-    _assert_distances(random_robot(seed, joints, floating), seed)
-
-
-@COUPLED
-def test_distances_and_their_gradients_where_joints_follow(robot: Robot) -> None:
-    _assert_distances(robot, 1)
 
 
 def _assert_distances(robot: Robot, seed: int) -> None:

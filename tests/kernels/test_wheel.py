@@ -48,20 +48,16 @@ def test_with_a_compiler(tmp_path: Path) -> None:
 
 
 def test_without_a_compiler(tmp_path: Path) -> None:
+    """Links of its page lead to the repository."""
     pytest.importorskip("setuptools")
     built = wheel(tmp_path, "/bin/false")
     assert built.stem.endswith("-py3-none-any")
     with zipfile.ZipFile(built) as archive:
         names = archive.namelist()
+        (metadata,) = (each for each in names if each.endswith("/METADATA"))
+        page = archive.read(metadata).decode()
     assert "excite_cli/kernels/compiled.py" in names
     assert not any(name.endswith(".so") for name in names)
-
-
-def test_links_of_the_page_lead_to_the_repository(tmp_path: Path) -> None:
-    pytest.importorskip("setuptools")
-    with zipfile.ZipFile(wheel(tmp_path, "/bin/false")) as archive:
-        (name,) = (each for each in archive.namelist() if each.endswith("/METADATA"))
-        page = archive.read(name).decode()
     home = re.findall(r"^Project-URL: Homepage, (.*)$", page, re.MULTILINE)[0]
     links = re.findall(r"\]\(([^)]+)\)", page)
     assert f"{home}/blob/main/docs/tutorial.md" in links

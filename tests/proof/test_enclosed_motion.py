@@ -1,4 +1,4 @@
-"""Enclosed kinematics and regressor rows against Pinocchio at instants within the intervals."""
+"""Enclosed kinematics, rows and distances against the same at instants within the intervals."""
 
 import numpy as np
 import pinocchio as pin
@@ -6,10 +6,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty, Piece
 from excite_cli.dynamics.whole_robot import whole_parameters
+from excite_cli.geometry.obstacle_distances import ObstacleDistances
+from excite_cli.geometry.obstacles import Box, Plane
+from excite_cli.geometry.pair_distances import PairDistances
+from excite_cli.proof.enclosed_distances import EnclosedCapsules
 from excite_cli.proof.enclosed_motion import EnclosedMotion
-from excite_cli.proof.enclosed_rows import ground_rows, mass_rows, torque_rows
+from excite_cli.proof.enclosed_obstacles import least_clearances
+from excite_cli.proof.enclosed_rows import combined, ground_rows, least_of, mass_rows, torque_rows
 from excite_cli.proof.enclosed_trajectory import enclosed_states, intervals_of
+from excite_cli.proof.taylor import Taylor
+from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
 from excite_cli.trajectory.fourier import FourierTrajectory
 from tests.robot.coupled_robots import CLAW, coupled_robot
@@ -136,3 +144,118 @@ def test_enclosures_of_torque_shrink_with_the_third_power() -> None:
         torque_rows(motion_of(robot, 3, width)[0]).through(phi).radius for width in (0.02, 0.01)
     ]
     assert radii[0].max() / radii[1].max() > 6.0
+
+
+def uncertainty(rng: np.random.Generator, size: int) -> InertiaUncertainty:
+    center = rng.normal(size=size)
+    box = Piece(center, rng.uniform(0, 0.3, size), np.zeros((0, size)))
+    both = Piece(center, 0.1 * rng.normal(size=(size, size)), 0.2 * rng.normal(size=(3, size)))
+    return InertiaUncertainty((box, both))
+
+
+def functional(rng: np.random.Generator, spread: float) -> Taylor:
+    scale = np.array([1.0, spread, spread**2]).reshape(3, 1, 1, 1)
+    return Taylor(rng.normal(size=(3, 4, 2, 6)) * scale, spread**3 * rng.uniform(0, 1, (4, 2, 6)))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10**6), st.sampled_from([0.01, 0.2, 1.5]))
+def test_bound_holds_at_every_instant(seed: int, spread: float) -> None:
+    rng = np.random.default_rng(seed)
+    y, known = functional(rng, spread), uncertainty(rng, 6)
+    bound = least_of(y, known)
+    error = rng.uniform(-1, 1, y.shape)
+    for s in np.linspace(-1, 1, 21):
+        assert np.all(known.least(y.at(s) + error * y.radius) >= bound - 1e-9)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10**6))
+def test_bound_is_tight_for_short_intervals(seed: int) -> None:
+    """Off by no more than the crossing of signs and the radius explain: both go with the spread."""
+    rng = np.random.default_rng(seed)
+    known = uncertainty(rng, 6)
+    for spread in (0.02, 0.002):
+        y = functional(np.random.default_rng(seed), spread)
+        at = np.min([known.least(y.at(s)) for s in np.linspace(-1, 1, 41)], axis=0)
+        assert float(np.max(at - least_of(y, known))) < 2.5 * spread
+
+
+def test_combinations_of_rows() -> None:
+    rng = np.random.default_rng(3)
+    rows, a = functional(rng, 0.3), rng.normal(size=(5, 2))
+    found = combined(a, rows)
+    error = rng.uniform(-1, 1, rows.shape)
+    for s in (-1.0, 0.3, 1.0):
+        value = a @ (rows.at(s) + error * rows.radius)
+        assert np.all(np.abs(value - found.at(s)) <= found.radius + 1e-12)
+
+
+FAMILY = FourierTrajectory(3, 2.0)
+INSIDE = np.linspace(-1, 1, 21)
+
+
+def capsules_of(robot: Robot, rng: np.random.Generator) -> tuple[Capsule, ...]:
+    """One per body and one that stands; one of them a ball."""
+    found = []
+    for joint in range(robot.model.njoints):
+        start = rng.normal(size=3) * 0.3
+        end = start if joint == 2 else start + rng.normal(size=3) * 0.4
+        found.append(Capsule(f"link_{joint}", joint, start, end, 0.02, (f"link_{joint}",)))
+    return tuple(found)
+
+
+def assert_bounded(seed: int, width: float, least, true) -> np.ndarray:
+    """The truth, which the bounds do not exceed and are near."""
+    robot = random_robot(seed, 4)
+    rng = np.random.default_rng(seed)
+    coefficients = rng.normal(size=(FAMILY.n_coefficients, robot.n)) * 0.5
+    capsules = capsules_of(robot, rng)
+    intervals = intervals_of(FAMILY, width).only(slice(0, 60, 3))
+    motion = EnclosedMotion(robot, enclosed_states(FAMILY, coefficients, intervals))
+    bound, values = least(EnclosedCapsules(capsules, motion)), []
+    for s in INSIDE:
+        times = intervals.middles + s * intervals.halves
+        values.append(true(robot, capsules, FAMILY.basis(times).states(coefficients)[0]))
+    truth = np.min(values, axis=0)
+    assert np.all(bound <= truth + 1e-9)
+    if width < 0.1:
+        apart = truth > 0.03
+        assert np.quantile((truth - bound)[apart], 0.9) < 2e-3
+    return truth
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("width", [0.2, 0.02])
+def test_capsules(seed: int, width: float) -> None:
+    pairs = [(i, j) for i in range(5) for j in range(i + 1, 5)]
+    first, second = np.array(pairs).T
+    least = assert_bounded(
+        seed,
+        width,
+        lambda axes: axes.least_distances(first, second, 10.0),
+        lambda robot, capsules, q: PairDistances(robot, capsules, pairs).distances(q),
+    )
+    assert width > 0.1 or (least > 0.03).sum() > 20
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("width", [0.2, 0.02])
+def test_obstacles(seed: int, width: float) -> None:
+    rng = np.random.default_rng(seed + 100)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    things = (
+        Plane("wall", turn[0], -1.0),
+        Box("box", turn * np.sign(np.linalg.det(turn)), rng.normal(size=3), np.full(3, 0.2)),
+    )
+    which = np.arange(5)
+    for index, thing in enumerate(things):
+        pairs = [(capsule, index) for capsule in range(5)]
+        assert_bounded(
+            seed,
+            width,
+            lambda axes, thing=thing: least_clearances(axes, thing, which, 10.0),
+            lambda robot, capsules, q, pairs=pairs: ObstacleDistances(
+                robot, capsules, things, pairs
+            ).distances(q),
+        )

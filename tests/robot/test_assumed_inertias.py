@@ -59,18 +59,14 @@ def test_they_are_those_of_mujoco(tmp_path: Path, name: str, kind: str) -> None:
 
 
 def test_exports_start_from_the_urdf_as_given(tmp_path: Path) -> None:
-    """With the masses, and its joints as they are."""
+    """With the masses, and its joints as they are; links that have mass keep it."""
     arm = link("arm", mass=-1)
-    written(tmp_path, link("base"), joint("j", "base", "arm", kind="continuous"), arm)
-    urdf = build_robot(RobotSpec(urdf="robot.urdf", density=1000.0), tmp_path).description.urdf
-    assert 'type="continuous"' in urdf
-    assert urdf.count("<mass") == 2
-
-
-def test_links_that_have_mass_keep_it(tmp_path: Path) -> None:
-    written(tmp_path, link("base"), joint("j", "base", "arm", GOOD), link("arm", mass=0.7))
-    dense = build_robot(RobotSpec(urdf="robot.urdf", density=1000.0), tmp_path)
-    assert dense.model.inertias[1].mass == 0.7
+    turning = joint("j", "base", "arm", kind="continuous")
+    written(tmp_path, link("base"), turning, arm, joint("k", "arm", "tip", GOOD), link("tip", 0.7))
+    robot = build_robot(RobotSpec(urdf="robot.urdf", density=1000.0), tmp_path)
+    assert 'type="continuous"' in robot.description.urdf
+    assert robot.description.urdf.count("<mass") == 3
+    assert robot.model.inertias[2].mass == 0.7
 
 
 def test_shapes_that_are_missing_or_flat_leave_a_link_without_mass(tmp_path: Path) -> None:
@@ -80,10 +76,10 @@ def test_shapes_that_are_missing_or_flat_leave_a_link_without_mass(tmp_path: Pat
 
 def test_a_mesh_that_changes_is_read_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    (tmp_path / "m.obj").write_text(OBJ)
-    first = ours(tmp_path, '<mesh filename="m.obj"/>').model.inertias[1].mass
-    assert ours(tmp_path, '<mesh filename="m.obj"/>').model.inertias[1].mass == first
-    (tmp_path / "m.obj").write_text(OBJ.replace("0.4", "0.8"))
-    assert ours(tmp_path, '<mesh filename="m.obj"/>').model.inertias[1].mass == pytest.approx(
-        2 * first
-    )
+
+    def mass(height: str) -> float:
+        (tmp_path / "m.obj").write_text(OBJ.replace("0.4", height))
+        return float(ours(tmp_path, '<mesh filename="m.obj"/>').model.inertias[1].mass)
+
+    assert mass("0.4") == mass("0.4")
+    assert mass("0.8") == pytest.approx(2 * mass("0.4"))

@@ -21,10 +21,10 @@ from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.robot.model import Robot, build_robot
 from excite_cli.simulation.build import true_inertias
 from excite_cli.simulation.mujoco_model import build_plant
+from tests.robot.smoke_arm import ARM as SMOKE
 
 from .random_robots import random_urdf
 
-SMOKE = Path(__file__).parents[2] / "data" / "smoke_arm.urdf"
 MASS, CENTER, INERTIA = 2.5, (0.1, -0.2, 0.3), (0.02, 0.03, 0.04)
 CAPSULE = {"start": (0.0, 0.0, 0.1), "end": (0.0, 0.2, 0.1), "radius": 0.05}
 FIXED = (
@@ -54,16 +54,16 @@ def test_as_a_link_of_the_urdf(tmp_path: Path, seed: int, base: str, link: str) 
     (tmp_path / "plain.urdf").write_text(text, encoding="utf-8")
     loaded = text.replace("</robot>", FIXED.format(link=link) + "</robot>")
     (tmp_path / "loaded.urdf").write_text(loaded, encoding="utf-8")
-    common = {
-        "base": base,
-        "base_orientation": (0.3, -0.2, 0.5),
-        "joints": ("joint_1", "joint_3", "joint_4"),
-        "posture": {"joint_2": 0.2},
-    }
-    plain = RobotSpec.model_validate({"urdf": "plain.urdf", **common, "payload": payload(link)})
-    other = RobotSpec.model_validate({"urdf": "loaded.urdf", **common})
-    robot, reference = build_robot(plain, tmp_path), build_robot(other, tmp_path)
-    bare = build_robot(plain.model_copy(update={"payload": None}), tmp_path)
+    common = {"base": base, "base_orientation": (0.3, -0.2, 0.5), "posture": {"joint_2": 0.2}}
+    common["joints"] = ("joint_1", "joint_3", "joint_4")
+    robot, bare, reference = (
+        build_robot(RobotSpec.model_validate({**common, **given}), tmp_path)
+        for given in (
+            {"urdf": "plain.urdf", "payload": payload(link)},
+            {"urdf": "plain.urdf"},
+            {"urdf": "loaded.urdf"},
+        )
+    )
     phi = standard_parameters(robot)
     assert phi == pytest.approx(standard_parameters(reference), abs=1e-12)
     assert phi - payload_parameters(robot) == pytest.approx(standard_parameters(bare), abs=1e-12)
@@ -84,6 +84,9 @@ def test_regressor_and_fingerprint_do_not_change_but_phi_does() -> None:
     change = standard_parameters(robot) - standard_parameters(bare)
     assert np.flatnonzero(change).min() >= 40  # the tool is the last of five bodies
     assert change[40] == MASS
+    shape = smoke(mass=0.0, inertia=(0.0, 0.0, 0.0))
+    assert np.array_equal(standard_parameters(shape), standard_parameters(bare))
+    assert "payload" in {c.name for c in fit_capsules(shape, SelfCollisionSpec())}
 
 
 def test_mujoco_carries_it_too() -> None:
@@ -99,46 +102,43 @@ def test_mujoco_carries_it_too() -> None:
         assert data.qfrc_inverse[plant.motor] == pytest.approx(expected[t], abs=1e-8)
 
 
-def test_capsule_is_in_the_frame_of_the_joint() -> None:
+def test_capsule_is_in_the_frame_of_the_joint(tmp_path: Path) -> None:
     """UR10's tool0 is turned and shifted on its last joint."""
-    spec = RobotSpec(urdf="example-robot-data:ur10", payload=payload("tool0"))
-    robot = build_robot(spec)
+    robot = build_robot(RobotSpec(urdf="example-robot-data:ur10", payload=payload("tool0")))
     assert robot.payload is not None
     capsule = robot.payload.capsule
     frame = robot.model.frames[robot.model.getFrameId("tool0")]
     assert (capsule.joint, capsule.links) == (frame.parentJoint, ("payload",))
-    assert np.abs(frame.placement.homogeneous - np.eye(4)).max() > 0.05
-    homogeneous = frame.placement.homogeneous @ [*CAPSULE["end"], 1.0]  # type: ignore[misc]
-    assert capsule.end == pytest.approx(homogeneous[:3])
-
-
-def test_neighbour_of_its_own_link_only() -> None:
-    """On the wrist: never checked against it, checked against the links before and after."""
-    robot = build_robot(
-        RobotSpec(urdf=str(SMOKE), payload=payload("wrist", start=(0.2, 0, 0), end=(0.2, 0, 0.1)))
-    )
-    spec = SelfCollisionSpec()
-    capsules = fit_capsules(robot, spec)
-    assert [c.name for c in capsules if c.by_hand] == ["payload"]
-    pairs = choose_pairs(robot, capsules, spec)
-    reasons = {frozenset((d.first, d.second)): d.reason.why for d in pairs.dropped}
-    assert reasons[frozenset(("payload", "wrist"))] is Why.SAME_BODY
-    for other in ("forearm", "tool", "upper_arm", "base"):
-        assert reasons.get(frozenset(("payload", other))) is not Why.ADJACENT
-    checked = {frozenset((capsules[i].name, capsules[j].name)) for i, j in pairs.checked}
-    assert frozenset(("payload", "upper_arm")) in checked
-    ignoring = SelfCollisionSpec(ignore=(("payload", "upper_arm"),))
-    pairs = choose_pairs(robot, fit_capsules(robot, ignoring), ignoring)
-    reasons = {frozenset((d.first, d.second)): d.reason.why for d in pairs.dropped}
-    assert reasons[frozenset(("payload", "upper_arm"))] is Why.IGNORED
-
-
-def test_a_link_of_the_same_name_is_told_apart(tmp_path: Path) -> None:
+    homogeneous = frame.placement.homogeneous
+    assert np.abs(homogeneous - np.eye(4)).max() > 0.05
+    assert capsule.end == pytest.approx((homogeneous @ [*CAPSULE["end"], 1.0])[:3])
+    # A link of the same name is told apart.
     text = SMOKE.read_text(encoding="utf-8").replace('"tool"', '"payload"')
     (tmp_path / "arm.urdf").write_text(text, encoding="utf-8")
     robot = build_robot(RobotSpec(urdf="arm.urdf", payload=payload("payload")), tmp_path)
     names = [capsule.name for capsule in fit_capsules(robot, SelfCollisionSpec())]
     assert {"payload", "robot.payload"} <= set(names)
+
+
+def test_neighbour_of_its_own_link_only() -> None:
+    """On the wrist: never checked against it, checked against the links before and after."""
+    robot = smoke(link="wrist", start=(0.2, 0, 0), end=(0.2, 0, 0.1))
+
+    def chosen(**spec: object) -> tuple[set[frozenset[str]], dict[frozenset[str], Why]]:
+        asked = SelfCollisionSpec.model_validate(spec)
+        capsules = fit_capsules(robot, asked)
+        assert [c.name for c in capsules if c.by_hand] == ["payload"]
+        pairs = choose_pairs(robot, capsules, asked)
+        checked = {frozenset((capsules[i].name, capsules[j].name)) for i, j in pairs.checked}
+        return checked, {frozenset((d.first, d.second)): d.reason.why for d in pairs.dropped}
+
+    checked, reasons = chosen()
+    assert reasons[frozenset(("payload", "wrist"))] is Why.SAME_BODY
+    for other in ("forearm", "tool", "upper_arm", "base"):
+        assert reasons.get(frozenset(("payload", other))) is not Why.ADJACENT
+    pair = frozenset(("payload", "upper_arm"))
+    assert pair in checked
+    assert chosen(ignore=(("payload", "upper_arm"),))[1][pair] is Why.IGNORED
 
 
 def test_exported_urdf_is_the_robot_without_it(tmp_path: Path) -> None:
@@ -157,13 +157,6 @@ def test_exported_urdf_is_the_robot_without_it(tmp_path: Path) -> None:
     expected = standard_parameters(build_robot(RobotSpec(urdf=str(SMOKE))))
     assert standard_parameters(bare) == pytest.approx(expected, abs=1e-12)
     assert any("is part of its body" in note for note in mjcf(robot, IdentifiedModel(phi)).notes)
-
-
-def test_without_mass_it_is_only_a_shape() -> None:
-    robot = smoke(mass=0.0, inertia=(0.0, 0.0, 0.0))
-    bare = build_robot(RobotSpec(urdf=str(SMOKE)))
-    assert np.array_equal(standard_parameters(robot), standard_parameters(bare))
-    assert "payload" in {c.name for c in fit_capsules(robot, SelfCollisionSpec())}
 
 
 @pytest.mark.parametrize(

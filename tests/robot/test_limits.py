@@ -1,26 +1,44 @@
-"""Position limits that are equal, reversed or missing: in every format, and through mimic."""
+"""Position limits that are equal, reversed or missing, in every format; joints that follow others.
+
+Of followers: their limits, where they stand, and what is told of wrong ones.
+"""
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from excite_cli.config.load import parse_spec
 from excite_cli.config.robot_spec import JointLimits, RobotSpec
+from excite_cli.dynamics.base_parameters import find_base_parameters
+from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.effects.catalogue import urdf_friction
+from excite_cli.effects.coulomb_friction import CoulombFriction
+from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.errors import ConfigError, RobotError
+from excite_cli.excitation.boundary import posture_of as boundary_posture
 from excite_cli.excitation.problem import build_problem
 from excite_cli.proposal.joints import choose_joints
 from excite_cli.proposal.limits import plan_limits
 from excite_cli.proposal.propose import Proposal, Request, propose
+from excite_cli.robot.carried_bodies import MovedBodies
 from excite_cli.robot.description import load_description
-from excite_cli.robot.model import build_robot
+from excite_cli.robot.link_frame import leaves, link_frame, own_link
+from excite_cli.robot.model import Robot, build_robot
+from excite_cli.robot.overview import describe
+from excite_cli.robot.tree import skeleton_of
 from excite_cli.robot.urdf_joints import survey
 from excite_cli.shown.note import Level
 from excite_cli.summary.problem import problem_notes
 from tests.proposal.robots import GOOD, joint, link, written
+from tests.robot.coupled_robots import CLAW, HAND, coupled_robot, urdf_of
+from tests.robot.formats.test_sdf import joint as sdf_joint
+from tests.robot.formats.test_sdf import link as sdf_link
 
 KINDS = {"revolute": "hinge", "prismatic": "slide"}
 
@@ -57,28 +75,13 @@ def mjcf(lower: float, upper: float, kind: str, more: str = "") -> str:
 
 
 def sdf(lower: float, upper: float, kind: str) -> str:
-    def link_of(name: str, height: float) -> str:
-        inertia = "".join(f"<{k}>0.01</{k}>" for k in ("ixx", "iyy", "izz"))
-        return (
-            f'<link name="{name}"><pose>0 0 {height} 0 0 0</pose><inertial><mass>1</mass>'
-            f"<inertia>{inertia}</inertia></inertial></link>"
-        )
-
-    def joint_of(name: str, type_: str, ends: tuple[str, str], low: float, high: float) -> str:
-        limit = f"<limit><lower>{low}</lower><upper>{high}</upper><effort>50</effort></limit>"
-        between = f"<parent>{ends[0]}</parent><child>{ends[1]}</child>"
-        return (
-            f'<joint name="{name}" type="{type_}">{between}'
-            f"<axis><xyz>0 1 0</xyz>{limit}</axis></joint>"
-        )
-
-    return (
-        '<sdf version="1.8"><model name="robot">'
-        + "".join(link_of(name, k * 0.25) for k, name in enumerate(("base", "upper", "tip")))
-        + joint_of("shoulder", "revolute", ("base", "upper"), -2, 2)
-        + joint_of("odd", kind, ("upper", "tip"), lower, upper)
-        + "</model></sdf>"
+    links = (
+        sdf_link(name, f"0 0 {k / 4} 0 0 0") for k, name in enumerate(("base", "upper", "tip"))
     )
+    odd = sdf_joint("odd", "upper", "tip", kind=kind).replace("<lower>-1<", f"<lower>{lower}<")
+    joints = sdf_joint("shoulder", "base", "upper") + odd.replace("<upper>2<", f"<upper>{upper}<")
+    inside = "".join(links) + joints
+    return f'<sdf version="1.8"><model name="robot">{inside}</model></sdf>'
 
 
 FORMATS = {
@@ -114,6 +117,11 @@ def test_equal_limits_hold_a_joint(tmp_path: Path, name: str, kind: str) -> None
     assert found.settled.problem.robot.locked == {"odd": pytest.approx(0.05)}
     unit = "m" if kind == "prismatic" else "rad"
     assert f"not moved, held at 0.05 {unit} by equal position limits: odd" in found.notes
+    with pytest.raises(ConfigError, match=r"--joints: 'odd' is held at 0.05 by equal"):
+        proposed(path, ("shoulder", "odd"))
+    text = f"robot: {{urdf: {name}}}\ncriterion: {{kind: log_det}}"
+    said = [n.text for n in problem_notes(build_problem(parse_spec(text, "a config"), tmp_path))]
+    assert "not moved, held by equal position limits: odd at 0.05" in said
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -165,23 +173,6 @@ def test_a_config_must_give_limits_that_are_missing(tmp_path: Path) -> None:
         build_robot(spec, tmp_path)
     still = spec.model_copy(update={"joints": ("shoulder",), "posture": {"odd": 0.7}})
     assert build_robot(still, tmp_path).locked == {"odd": 0.7}
-
-
-def test_what_is_held_is_said_of_all_joints(tmp_path: Path) -> None:
-    made(tmp_path, "robot.urdf", 0.5, 0.5)
-    text = (
-        "robot: {urdf: robot.urdf}\ntrajectory: {family: fourier, harmonics: 4, "
-        "base_frequency: 1.0}\nsampling: {cost: {samples: 40}, constraints: {samples: 80}}\n"
-        "criterion: {kind: log_det}"
-    )
-    said = [n.text for n in problem_notes(build_problem(parse_spec(text, "a config"), tmp_path))]
-    assert "not moved, held by equal position limits: odd at 0.5" in said
-
-
-def test_joints_that_are_held_cannot_be_asked_for(tmp_path: Path) -> None:
-    path = made(tmp_path, "robot.urdf", 0.5, 0.5)
-    with pytest.raises(ConfigError, match=r"--joints: 'odd' is held at 0.5 by equal"):
-        proposed(path, ("shoulder", "odd"))
 
 
 def test_a_robot_of_which_nothing_moves(tmp_path: Path) -> None:
@@ -289,3 +280,127 @@ def test_what_is_assumed_lies_within_what_is_given(
     if not low == high == 0.0:
         assert low <= plan.lower < plan.upper <= high
     assert ("position" in plan.notes) == ((plan.lower, plan.upper) != (low, high))
+
+
+def claw(folder: Path, old: str = "", new: str = "", **spec: Any) -> Robot:
+    """The claw with something else in its URDF."""
+    text = urdf_of(CLAW)
+    assert old in text
+    (folder / "claw.urdf").write_text(text.replace(old, new))
+    return build_robot(RobotSpec(urdf="claw.urdf", **spec), folder)
+
+
+def test_drivers_alone_are_moved_joints() -> None:
+    robot = coupled_robot(CLAW)
+    assert robot.joint_names == ("shoulder", "wrist", "knuckle")
+    assert robot.n == 3
+    assert robot.tree.n == 8
+    assert set(robot.followers[2]) == set(robot.tree.joint_names) - set(robot.joint_names)
+    assert robot.parents == (-1, 0, 1)
+    assert leaves(robot) == (2,)
+    assert skeleton_of(robot).fits(3)
+    links = describe(robot).joints[2].links
+    assert links[0] == "left_outer"
+    parts = ("outer", "finger", "inner")
+    assert set(links) == {f"{side}_{part}" for side in ("left", "right") for part in parts}
+
+
+def test_chains_of_followers_end_at_the_driver() -> None:
+    """As Pinocchio's own kinematics has it, joint by joint."""
+    robot = coupled_robot(CLAW)
+    q = np.array([0.1, 0.2, 0.5])
+    at = dict(zip(robot.tree.joint_names, robot.all_positions(q), strict=True))
+    assert at["knuckle"] == 0.5
+    assert at["left_tip"] == -0.5
+    assert at["right_inner_joint"] == -0.5
+    assert at["right_tip"] == pytest.approx(-0.9 * -0.5 + 0.05)
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, robot.configurations(q[None])[0])
+    tip, palm = (
+        data.oMf[robot.model.getFrameId(name)].rotation for name in ("left_finger", "palm")
+    )
+    np.testing.assert_allclose(tip, palm, atol=1e-12)  # the finger stays parallel
+    locked = coupled_robot(CLAW, joints=("shoulder", "wrist"), posture={"knuckle": 0.4})
+    assert locked.coupling is None
+    assert locked.locked["right_tip"] == pytest.approx(0.9 * 0.4 + 0.05)
+
+
+def test_followers_narrow_the_limits_of_their_driver(tmp_path: Path) -> None:
+    limit, narrow = (
+        f'lower="{low}" upper="{high}" velocity="{speed}" effort="30"'
+        for low, high, speed in ((-0.9, 0.9, 2), (-0.5, 0.3, 0.9))
+    )
+    tail = urdf_of(CLAW).split('name="right_tip"')[1]
+    given = {"left_tip": JointLimits(acceleration=5.0)}
+    limits = claw(tmp_path, tail, tail.replace(limit, narrow, 1), limits=given).limits
+    # right_tip stands at 0.9 q + 0.05, at most 0.3
+    assert limits.upper[2] == pytest.approx((0.3 - 0.05) / 0.9)
+    assert limits.lower[2] == 0.0
+    assert limits.velocity[2] == pytest.approx(0.9 / 0.9)
+    assert limits.acceleration[2] == 5.0
+    assert limits.effort[2] == 30.0
+    robot = claw(tmp_path, 'lower="-0.9" upper="0.9" velocity="2"', 'velocity="0"')
+    assert robot.limits.upper[2] == 0.8, "followers without limits do not narrow"
+    assert robot.limits.velocity[2] == 2.0
+
+
+def test_what_contradicts_the_driver_is_told(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"posture.left_tip: 0.3 is not where it stands, -0.4: it "
+                                          r"mimics 'knuckle'.*robot.posture.knuckle"):  # fmt: skip
+        coupled_robot(CLAW, posture={"knuckle": 0.4, "left_tip": 0.3})
+    assert coupled_robot(CLAW, posture={"knuckle": 0.4, "left_tip": -0.4}).posture[2] == 0.4
+    with pytest.raises(ConfigError, match=r"'finger_2' mimics 'finger_1' and moves with"):
+        coupled_robot(HAND, joints=("finger_2",))
+    with pytest.raises(ConfigError, match=r"joint 'finger_2' follows another joint \(mimic\)"):
+        boundary_posture(coupled_robot(HAND), {"finger_2": 0.02}, "trajectory.start")
+    with pytest.raises(ConfigError, match=r"'knuckle' may stand in \[0, 0.8\].*mimic it \(.*range"):
+        claw(tmp_path, 'lower="-0.9" upper="0.9"', 'lower="2" upper="3"')
+
+
+def test_what_nobody_can_follow_is_told(tmp_path: Path) -> None:
+    robot = claw(tmp_path, '<mimic joint="knuckle" multiplier="-1.0"', '<mimic joint="knuckl"')
+    assert {"left_tip", "right_knuckle", "right_tip"} == set(robot.locked)
+    assert robot.description.notes[0] == (
+        "'left_tip' mimics 'knuckl', which is no joint of the URDF: the joint is locked. Did you "
+        "mean 'knuckle'?"
+    )
+    with pytest.raises(RobotError, match=r"in a circle \(.*left_inner_joint → left_inner_joint\)"):
+        claw(tmp_path, '<mimic joint="knuckle" multiplier="1.0"',
+             '<mimic joint="left_inner_joint"')  # fmt: skip
+
+
+def test_friction_of_followers_is_felt_at_the_driver(tmp_path: Path) -> None:
+    text = urdf_of(HAND).replace(
+        '<mimic joint="finger_1"/>',
+        '<mimic joint="finger_1" multiplier="-0.5"/><dynamics damping="4" friction="3"/>',
+    ).replace('lower="0" upper="0.04"', 'lower="-0.04" upper="0.04"')  # fmt: skip
+    (tmp_path / "hand.urdf").write_text(text)
+    effects, values = urdf_friction(build_robot(RobotSpec(urdf=str(tmp_path / "hand.urdf"))))
+    assert effects == (ViscousFriction((2,)), CoulombFriction((2,)))
+    np.testing.assert_allclose(values, [1.0, 1.5])
+
+
+def test_the_mass_of_a_follower_is_a_parameter_of_its_driver() -> None:
+    robot = coupled_robot(HAND)
+    base = find_base_parameters(robot)
+    names = [base.names[index] for index in base.selection]
+    assert {"m[finger_1]", "m[finger_2]"} <= set(names)
+    row = base.mapping[names.index("m[finger_2]")]
+    assert row @ standard_parameters(robot) == pytest.approx(0.12)
+
+
+def test_links_that_followers_carry_hold_no_load() -> None:
+    robot = coupled_robot(HAND)
+    assert link_frame(robot, "left_finger", "--link").joint == 2
+    assert own_link(robot.tree, 3).name == "right_finger"
+    with pytest.raises(ConfigError, match=r"'right_finger' is carried by 'finger_2', which"):
+        link_frame(robot, "right_finger", "--link")
+
+
+def test_what_moves_two_links_against_each_other() -> None:
+    robot = coupled_robot(CLAW)
+    joints = {str(name): k for k, name in enumerate(robot.model.names)}
+    moved = MovedBodies(robot)
+    assert moved.between(joints["left_tip"], joints["right_tip"]).tolist() == [2]
+    assert moved.between(joints["shoulder"], joints["right_tip"]).tolist() == [1, 2]
+    assert moved.moving(joints["right_inner_joint"]).tolist() == [0, 1, 2]

@@ -3,7 +3,7 @@
 References are formulas written here or Pinocchio's inverse dynamics, not the effects' own columns.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
@@ -62,11 +62,57 @@ def moving(simulation: Simulation) -> tuple[Array, Array, Array, Array]:
     return keep, q, v, a
 
 
-def test_coulomb_friction_is_a_jump_and_nothing_between(robot: Robot) -> None:
-    simulation = played(robot, planted("coulomb_friction", (ELBOW,), 4.0))
+def peak(x: Array) -> float:
+    return float(np.abs(x).max())
+
+
+# An effect on the elbow, what it is from q, v, a and the rigid load there, and how exactly.
+FORMULAS: list[tuple[str, float, dict[str, float], Callable[..., Array], Callable, float]] = [
+    ("coulomb_friction", 4.0, {}, lambda q, v, a, load: 4.0 * np.sign(v), peak, 0.08),
+    ("viscous_friction", 5.0, {}, lambda q, v, a, load: 5.0 * v, peak, 0.03),
+    ("armature", 2.0, {}, lambda q, v, a, load: 2.0 * a, peak, 0.03),
+    ("spring", 20.0, {"rest_position": 0.5}, lambda q, v, a, load: 20 * (q - 0.5), peak, 0.03),
+    # One that pushes away has no part in MuJoCo, but acts.
+    ("spring", -15.0, {}, lambda q, v, a, load: -15.0 * q, peak, 0.05),
+    (
+        *("asymmetric_friction", 5.0, {"backward": 2.0}),
+        *(lambda q, v, a, load: np.where(v > 0, 5.0, -2.0), peak, 0.1),
+    ),
+    (
+        *("stribeck_friction", 3.0, {"stribeck_speed": 0.2}),
+        *(lambda q, v, a, load: 3.0 * np.exp(-((v / 0.2) ** 2)) * np.sign(v), rms, 0.05),
+    ),
+    (
+        *("load_dependent_friction", 0.1, {}),
+        *(lambda q, v, a, load: 0.1 * np.abs(load) * np.sign(v), rms, 0.05),
+    ),
+    (
+        *("nonlinear_viscous_friction", 8.0, {"power": 2.0}),
+        *(lambda q, v, a, load: 8.0 * v * np.abs(v), rms, 0.03),
+    ),
+    (
+        *("ripple", 1.0, {"sin": 0.5, "periods": 40.0}),
+        *(lambda q, v, a, load: np.cos(40 * q) + 0.5 * np.sin(40 * q), rms, 0.03),
+    ),
+]
+
+
+@pytest.mark.parametrize(("kind", "value", "others", "formula", "size", "most"), FORMULAS)
+def test_effects_of_one_joint_are_their_formulas(
+    robot: Robot,
+    kind: str,
+    value: float,
+    others: dict[str, float],
+    formula: Callable[..., Array],
+    size: Callable[[Array], float],
+    most: float,
+) -> None:
+    simulation = played(robot, planted(kind, (ELBOW,), value, **others))
     left = beyond_rigid(robot, simulation)
-    keep, _, v, _ = moving(simulation)
-    assert left[keep, ELBOW] == pytest.approx(4.0 * np.sign(v), abs=0.08)
+    keep, q, v, a = moving(simulation)
+    run = simulation.dataset.runs[0]
+    load = inner(RigidBody(robot, simulation.truth.phi, *states(run)).load)[keep, ELBOW]
+    assert size(left[keep, ELBOW] - formula(q, v, a, load)) < most
     others_untouched(left)
 
 
@@ -92,63 +138,6 @@ def test_dahl_friction_builds_up_over_its_distance(robot: Robot) -> None:
         played(robot, dry, planted("dahl_friction", (ELBOW,), 5.0))
 
 
-def test_viscous_friction(robot: Robot) -> None:
-    simulation = played(robot, planted("viscous_friction", (ELBOW,), 5.0))
-    left = beyond_rigid(robot, simulation)
-    keep, _, v, _ = moving(simulation)
-    assert left[keep, ELBOW] == pytest.approx(5.0 * v, abs=0.03)
-    others_untouched(left)
-
-
-def test_armature_is_inertia_at_the_motor(robot: Robot) -> None:
-    simulation = played(robot, planted("armature", (ELBOW,), 2.0))
-    left = beyond_rigid(robot, simulation)
-    keep, _, _, a = moving(simulation)
-    assert left[keep, ELBOW] == pytest.approx(2.0 * a, abs=0.03)
-    others_untouched(left)
-
-
-def test_a_spring_and_its_rest(robot: Robot) -> None:
-    simulation = played(robot, planted("spring", (ELBOW,), 20.0, rest_position=0.5))
-    left = beyond_rigid(robot, simulation)
-    q = inner(simulation.dataset.runs[0].q)[:, ELBOW]
-    assert left[:, ELBOW] == pytest.approx(20.0 * (q - 0.5), abs=0.03)
-    others_untouched(left)
-
-
-def test_a_spring_that_pushes_away_has_no_part_in_mujoco_but_acts(robot: Robot) -> None:
-    simulation = played(robot, planted("spring", (ELBOW,), -15.0))
-    q = inner(simulation.dataset.runs[0].q)[:, ELBOW]
-    assert beyond_rigid(robot, simulation)[:, ELBOW] == pytest.approx(-15.0 * q, abs=0.05)
-
-
-def test_asymmetric_friction(robot: Robot) -> None:
-    simulation = played(robot, planted("asymmetric_friction", (ELBOW,), 5.0, backward=2.0))
-    left = beyond_rigid(robot, simulation)
-    keep, _, v, _ = moving(simulation)
-    assert left[keep, ELBOW] == pytest.approx(np.where(v > 0, 5.0, -2.0), abs=0.1)
-    others_untouched(left)
-
-
-def test_stribeck_friction_falls_with_speed(robot: Robot) -> None:
-    simulation = played(robot, planted("stribeck_friction", (ELBOW,), 3.0, stribeck_speed=0.2))
-    left = beyond_rigid(robot, simulation)
-    keep, _, v, _ = moving(simulation)
-    expected = 3.0 * np.exp(-((v / 0.2) ** 2)) * np.sign(v)
-    assert rms(left[keep, ELBOW] - expected) < 0.05
-    others_untouched(left)
-
-
-def test_load_dependent_friction_follows_the_rigid_load(robot: Robot) -> None:
-    simulation = played(robot, planted("load_dependent_friction", (ELBOW,), 0.1))
-    left = beyond_rigid(robot, simulation)
-    keep, _, v, _ = moving(simulation)
-    run = simulation.dataset.runs[0]
-    load = inner(RigidBody(robot, simulation.truth.phi, *states(run)).load)[keep, ELBOW]
-    assert rms(left[keep, ELBOW] - 0.1 * np.abs(load) * np.sign(v)) < 0.05
-    others_untouched(left)
-
-
 def test_friction_that_drifts_down_is_less_at_the_end(robot: Robot) -> None:
     effects = (
         planted("coulomb_friction", (ELBOW,), 5.0),
@@ -159,21 +148,6 @@ def test_friction_that_drifts_down_is_less_at_the_end(robot: Robot) -> None:
     keep, _, v, _ = moving(simulation)
     t = inner(simulation.dataset.runs[0].t)[keep]
     assert rms(left[keep, ELBOW] - (5.0 - 0.5 * t) * np.sign(v)) < 0.1
-
-
-def test_nonlinear_viscous_friction(robot: Robot) -> None:
-    simulation = played(robot, planted("nonlinear_viscous_friction", (ELBOW,), 8.0, power=2.0))
-    keep, _, v, _ = moving(simulation)
-    left = beyond_rigid(robot, simulation)
-    assert rms(left[keep, ELBOW] - 8.0 * v * np.abs(v)) < 0.03
-
-
-def test_ripple_repeats_over_the_angle_without_lag(robot: Robot) -> None:
-    simulation = played(robot, planted("ripple", (ELBOW,), 1.0, sin=0.5, periods=40.0))
-    left = beyond_rigid(robot, simulation)
-    q = inner(simulation.dataset.runs[0].q)[:, ELBOW]
-    assert rms(left[:, ELBOW] - np.cos(40 * q) - 0.5 * np.sin(40 * q)) < 0.03
-    others_untouched(left)
 
 
 def test_a_cable_pulls_on_both_joints_with_one_potential(robot: Robot) -> None:
@@ -379,6 +353,30 @@ def test_effects_of_others_act_through_their_own_formula(robot: Robot, clean: Si
     assert grown == pytest.approx(0.3 * drifting.t, abs=1e-9)
 
 
+# What of the simulated robot each kind changes; all others act through their own formula, which the
+# controller knows.
+CHANGED = {
+    "wrench_gain": {"gain"},
+    "torque_gain": {"gain"},
+    "elasticity": {"soft"},
+    "backlash": {"soft"},
+    "viscous_friction": {"damping", "compensated"},
+    "coulomb_friction": {"friction", "compensated"},
+    "armature": {"armature", "compensated"},
+    "spring": {"springs", "compensated"},
+    "dahl_friction": {"hystereses", "friction", "compensated"},
+    "coupled_friction": {"couplings", "looped", "compensated"},
+    "base_tilt": {"gravity"},
+    "payload": {"phi"},
+    "encoder_offset": {"position_offset"},
+    "contact": {"pushes"},
+    "torque_offset": {"offset"},
+    "covariate_offset": {"recorded"},
+    "torque_delay": {"delay"},
+    "torque_saturation": {"reading"},
+}
+
+
 def a_place(kind: type[Effect], robot: Robot) -> tuple[int, ...]:
     whole = kind.scope in ("robot", "base")
     return tuple(range(robot.n)) if whole else kind.places(robot)[0]
@@ -390,13 +388,8 @@ def test_every_kind_of_the_catalogue_can_be_planted(robot: Robot, clean: Simulat
     What comes over a campaign is nothing in its first recording, what follows a column of the log
     nothing without one.
     """
-    tested = {
-        "viscous_friction", "coulomb_friction", "armature", "spring", "asymmetric_friction",
-        "stribeck_friction", "load_dependent_friction", "friction_drift", "ripple", "cable_force",
-        "nonlinear_viscous_friction", "coupled_friction", "base_tilt", "payload",
-        "encoder_offset", "contact", "elasticity", "backlash", "torque_offset", "torque_gain",
-        "torque_delay", "torque_saturation", "dahl_friction",
-    }  # fmt: skip
+    apart = ("friction_drift", "cable_force")  # with tests of their own, as those of formulas
+    tested = {*CHANGED, *apart, *(row[0] for row in FORMULAS)} - {"wrench_gain"}
     for name in sorted(set(catalogue()) - tested):
         kind = catalogue()[name]
         if kind.of_campaign or kind.follows_covariate:
@@ -404,30 +397,6 @@ def test_every_kind_of_the_catalogue_can_be_planted(robot: Robot, clean: Simulat
         joints = a_place(kind, robot)
         run = played(robot, plant(kind, joints, kind.parameters[0].high / 10)).dataset.runs[0]
         assert not np.array_equal(run.tau, clean.dataset.runs[0].tau), name
-
-
-# What of the simulated robot each kind changes; all others act through their own formula, which the
-# controller knows.
-CHANGED = {
-    "wrench_gain": {"gain"},
-    "viscous_friction": {"damping", "compensated"},
-    "coulomb_friction": {"friction", "compensated"},
-    "armature": {"armature", "compensated"},
-    "spring": {"springs", "compensated"},
-    "dahl_friction": {"hystereses", "friction", "compensated"},
-    "coupled_friction": {"couplings", "looped", "compensated"},
-    "elasticity": {"soft"},
-    "backlash": {"soft"},
-    "base_tilt": {"gravity"},
-    "payload": {"phi"},
-    "encoder_offset": {"position_offset"},
-    "contact": {"pushes"},
-    "torque_offset": {"offset"},
-    "covariate_offset": {"recorded"},
-    "torque_gain": {"gain"},
-    "torque_delay": {"delay"},
-    "torque_saturation": {"reading"},
-}
 
 
 @pytest.mark.parametrize("name", list(catalogue()))

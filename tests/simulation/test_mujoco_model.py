@@ -77,27 +77,17 @@ def test_a_follower_without_mass_is_told(tmp_path: Path) -> None:
         make(assemble(robot, standard_parameters(robot), RunId("a"), ()), 1e-3)
 
 
-@pytest.mark.parametrize("name", ["ur10", "panda"])
-def test_arms(name: str) -> None:
-    assert_same_dynamics(build_robot(RobotSpec(urdf=f"example-robot-data:{name}")))
-
-
-def test_a_part_of_a_humanoid_on_a_hoist() -> None:
+def test_arms_and_a_part_of_a_humanoid_on_a_hoist() -> None:
+    """And gravity of the config."""
     joints = tuple(f"arm_{side}_{k}_joint" for side in ("left", "right") for k in range(1, 8))
-    spec = RobotSpec(
-        urdf="example-robot-data:talos",
-        joints=joints,
-        base="floating",
-        rows=("base", "joints"),
-        base_orientation=(0.1, -0.2, 0.3),
-        posture={"torso_1_joint": 0.3},
-    )
-    assert_same_dynamics(build_robot(spec))
-
-
-def test_gravity_of_the_config_pulls() -> None:
-    spec = RobotSpec(urdf="example-robot-data:ur10", gravity=(1.0, 2.0, -3.0))
-    assert_same_dynamics(build_robot(spec))
+    hoist = {"base": "floating", "rows": ("base", "joints"), "base_orientation": (0.1, -0.2, 0.3)}
+    for name, more in (
+        ("ur10", {}),
+        ("panda", {}),
+        ("ur10", {"gravity": (1.0, 2.0, -3.0)}),
+        ("talos", {"joints": joints, "posture": {"torso_1_joint": 0.3}, **hoist}),
+    ):
+        assert_same_dynamics(build_robot(RobotSpec(urdf=f"example-robot-data:{name}", **more)))
 
 
 def test_a_soft_joint_that_does_not_give_is_a_joint_with_a_rotor() -> None:
@@ -128,13 +118,10 @@ def test_true_inertias_are_off_by_what_was_asked_and_belong_to_bodies(tmp_path: 
         change = np.linalg.norm(found - nominal, axis=1) / np.linalg.norm(nominal, axis=1)
         assert 0.4 * error < np.median(change) < 2 * error
         for ten in found:
-            assert np.linalg.eigvalsh(pseudo_inertias(ten)[0]).min() >= -1e-12
+            pseudo = pseudo_inertias(ten)[0]
+            assert np.linalg.eigvalsh(pseudo).min() >= -1e-12
+            assert ten_parameters(pseudo) == pytest.approx(ten, abs=1e-14)
     assert np.array_equal(true_inertias(robot, 0.0, seed=1), standard_parameters(robot))
     again = true_inertias(robot, 0.2, seed=1)
     assert np.array_equal(again, true_inertias(robot, 0.2, seed=1))
     assert not np.array_equal(again, true_inertias(robot, 0.2, seed=2))
-
-
-def test_ten_parameters_invert_the_pseudo_inertia() -> None:
-    ten = standard_parameters(random_robot(1, joints=1))[:10]
-    assert ten_parameters(pseudo_inertias(ten)[0]) == pytest.approx(ten, abs=1e-14)

@@ -30,15 +30,10 @@ def robot() -> Robot:
     return arm()
 
 
-def test_rigid_bodies_alone_explain_the_torque_of_a_bare_robot(robot: Robot) -> None:
-    simulation = played(robot)
-    (run,) = simulation.dataset.runs
-    share = rms(beyond_rigid(robot, simulation)) / rms(run.tau)
-    assert share.max() < 2e-3, share
-    assert share[:3].max() < 5e-4, share
-
-
-def test_the_motion_is_followed_although_the_controller_knows_the_urdf_only(robot: Robot) -> None:
+def test_the_motion_is_followed_although_the_controller_knows_the_urdf_only(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rigid bodies alone explain the torque of a bare robot."""
     simulation = played(robot)
     (run,) = simulation.dataset.runs
     wanted, _, _ = motion(robot).states(run.t)
@@ -49,9 +44,15 @@ def test_the_motion_is_followed_although_the_controller_knows_the_urdf_only(robo
     assert run.t[0] == 0.0
     assert len(run.t) == 2000
     assert run.dq is not None
-
-
-def test_without_mujoco_there_is_one_message(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    share = rms(beyond_rigid(robot, simulation)) / rms(run.tau)
+    assert share.max() < 2e-3, share
+    assert share[:3].max() < 5e-4, share
+    (odd,) = played(robot, control_rate=300.0, rate=130.0, bandwidth=40.0).dataset.runs
+    assert odd.step == pytest.approx(1 / 130), "odd rates keep time"
+    assert rms(motion(robot).states(odd.t)[0] - odd.q).max() < 5e-3
+    (twice,) = played(robot, periods=2).dataset.runs
+    assert len(twice.t) == 4000
+    assert twice.q[:2000] == pytest.approx(twice.q[2000:], abs=2e-3)
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(MissingExtraError, match=r"pip install 'excite-cli\[sim\]'"):
         played(robot)
@@ -63,14 +64,6 @@ def test_a_floating_base_stands_still_on_its_hoist() -> None:
     simulation = simulate(robot, [trajectory], IDEAL)
     left = rms(beyond_rigid(robot, simulation)) / rms(simulation.dataset.runs[0].tau)
     assert left.max() < 5e-3
-
-
-def test_odd_rates_keep_time(robot: Robot) -> None:
-    simulation = played(robot, control_rate=300.0, rate=130.0, bandwidth=40.0)
-    (run,) = simulation.dataset.runs
-    assert run.step == pytest.approx(1 / 130)
-    wanted, _, _ = motion(robot).states(run.t)
-    assert rms(wanted - run.q).max() < 5e-3
 
 
 def test_a_motion_that_is_not_periodic_is_entered_and_left(robot: Robot) -> None:
@@ -97,14 +90,22 @@ def test_the_same_seed_gives_the_same_numbers(robot: Robot) -> None:
 
 def test_noise_is_of_the_size_and_correlation_asked_for(robot: Robot) -> None:
     ideal = played(robot).dataset.runs[0]
-    noisy = played(robot, torque_noise=0.02, noise_correlation=0.7).dataset.runs[0]
-    noise = noisy.tau - ideal.tau
+
+    def lagged(noise: np.ndarray) -> np.ndarray:
+        return np.mean(noise[1:] * noise[:-1], axis=0) / np.mean(noise**2, axis=0)
+
+    noise = played(robot, torque_noise=0.02, noise_correlation=0.7).dataset.runs[0].tau - ideal.tau
     assert rms(noise) / rms(ideal.tau) == pytest.approx(np.full(robot.n, 0.02), rel=0.15)
-    lagged = np.mean(noise[1:] * noise[:-1], axis=0) / np.mean(noise**2, axis=0)
-    assert lagged == pytest.approx(np.full(robot.n, 0.7), abs=0.08)
-    white = played(robot, torque_noise=0.02).dataset.runs[0].tau - ideal.tau
-    lagged = np.mean(white[1:] * white[:-1], axis=0) / np.mean(white**2, axis=0)
-    assert np.abs(lagged).max() < 0.1
+    assert lagged(noise) == pytest.approx(np.full(robot.n, 0.7), abs=0.08)
+    first, second = played(robot, torque_noise=0.02, repeat=2).dataset.runs
+    assert np.abs(lagged(first.tau - ideal.tau)).max() < 0.1
+    # Takes repeat a motion with fresh noise; without pauses they have no stamps.
+    assert (first.name, second.name) == ("motion_1_take_1", "motion_1_take_2")
+    assert np.array_equal(first.q, second.q)
+    apart = rms(first.tau - second.tau) / rms(first.tau)
+    assert apart == pytest.approx(np.full(robot.n, 0.02 * np.sqrt(2)), rel=0.15)
+    assert (first.epoch, second.epoch) == (None, None)
+    assert second.start == pytest.approx(first.duration)
 
 
 def test_encoders_count(robot: Robot) -> None:
@@ -116,21 +117,6 @@ def test_encoders_count(robot: Robot) -> None:
     assert run.dq is not None
     true_speed = motion(robot).states(run.t)[1]
     assert 0.01 < rms(run.dq - true_speed)[0] < 0.5  # a drive's speed is noisy at this resolution
-
-
-def test_takes_repeat_a_motion_with_fresh_noise(robot: Robot) -> None:
-    simulation = played(robot, repeat=2, torque_noise=0.01)
-    first, second = simulation.dataset.runs
-    assert (first.name, second.name) == ("motion_1_take_1", "motion_1_take_2")
-    assert np.array_equal(first.q, second.q)
-    apart = rms(first.tau - second.tau) / rms(first.tau)
-    assert apart == pytest.approx(np.full(robot.n, 0.01 * np.sqrt(2)), rel=0.15)
-
-
-def test_periods_go_on(robot: Robot) -> None:
-    run = played(robot, periods=2).dataset.runs[0]
-    assert len(run.t) == 4000
-    assert run.q[:2000] == pytest.approx(run.q[2000:], abs=2e-3)
 
 
 def test_declared_effects_are_there_in_plausible_sizes(robot: Robot) -> None:
@@ -158,20 +144,14 @@ def test_motors_stop_at_their_limits_if_asked(robot: Robot) -> None:
     assert np.abs(played(weak).dataset.runs[0].tau[:, ELBOW]).max() > level
 
 
-def test_a_joint_that_moves_no_inertia_is_named() -> None:
-    robot = arm()
-    empty = Build.bare(robot, np.zeros(10 * robot.n_bodies), RunId("motion_1"))
-    with (
-        silent_engine(),
-        pytest.raises(RobotError, match=r"'shoulder_pan_joint' moves no inertia(.|\n)*armature@"),
-    ):
-        make(empty, 5e-4)
-
-
-def test_a_robot_that_runs_away_is_told(robot: Robot) -> None:
+def test_a_robot_that_runs_away_or_moves_no_inertia_is_told(robot: Robot) -> None:
     torn = plant(kind_named("spring"), (ELBOW,), -1e5)
     with pytest.raises(RobotError, match=r"'motion_1'.* ran away at .*joint"):
         played(robot, torn)
+    empty = Build.bare(robot, np.zeros(10 * robot.n_bodies), RunId("motion_1"))
+    words = r"'shoulder_pan_joint' moves no inertia(.|\n)*armature@"
+    with silent_engine(), pytest.raises(RobotError, match=words):
+        make(empty, 5e-4)
 
 
 @pytest.mark.parametrize(
@@ -206,9 +186,3 @@ def test_friction_goes_on_changing_from_one_recording_to_the_next(robot: Robot) 
     assert np.median(more[moving] * np.sign(first.dq[moving, ELBOW])) == pytest.approx(  # type: ignore[index]
         expected, rel=0.1
     )
-
-
-def test_recordings_without_pauses_have_no_stamps(robot: Robot) -> None:
-    runs = simulate(robot, [motion(robot)], replace(IDEAL, repeat=2)).dataset.runs
-    assert [run.epoch for run in runs] == [None, None]
-    assert runs[1].start == pytest.approx(runs[0].duration)

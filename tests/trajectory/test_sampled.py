@@ -99,9 +99,13 @@ def test_few_samples_give_the_polynomial_through_them(count: int) -> None:
     t, q = np.arange(count, dtype=float), np.random.default_rng(2).normal(size=(count, 2))
     family, alpha = through_samples(t, q)
     times = np.linspace(0.0, count - 1.0, 21)
+    found = family.states(times, alpha)[0]
     for j in range(2):
         wanted = np.polynomial.Polynomial.fit(t, q[:, j], count - 1)(times)
-        assert family.states(times, alpha)[0][:, j] == pytest.approx(wanted, abs=1e-9)
+        assert found[:, j] == pytest.approx(wanted, abs=1e-9)
+    chain = Chain((Segment("a", family, alpha), Segment("b", family, alpha)))
+    in_chain = chain.states(times[:-1] + family.duration)[0]
+    assert in_chain == pytest.approx(found[:-1], abs=1e-9), "samples have their place in a chain"
 
 
 def test_ten_thousand_knots_take_little_memory() -> None:
@@ -129,6 +133,7 @@ def test_slowed_is_the_same_path_later_with_the_same_coefficients(family: Trajec
     alpha = np.random.default_rng(5).normal(size=(family.n_coefficients, 2))
     pace = 0.37
     slow = family.slowed(pace)
+    wrapped = Slowed(family, pace)
     assert type(slow) is type(family)
     assert slow.n_coefficients == family.n_coefficients
     assert slow.duration == pytest.approx(family.duration / pace)
@@ -140,28 +145,10 @@ def test_slowed_is_the_same_path_later_with_the_same_coefficients(family: Trajec
         assert other == pytest.approx(one * pace**order, rel=1e-9, abs=1e-9)
     for one, other in zip(slow.states(times / pace, alpha), after, strict=False):
         assert one == pytest.approx(other, rel=1e-9, abs=1e-9)
+    for one, other in zip(wrapped.states(times / pace, alpha), after, strict=False):
+        assert one == pytest.approx(other, rel=1e-9, abs=1e-9)
     again = slow.slowed(1 / pace)
     assert again.states(times, alpha)[2] == pytest.approx(before[2], rel=1e-9, abs=1e-9)
     assert slow.beyond(alpha) == pytest.approx(
         family.beyond(alpha) * pace ** (family.smooth_orders + 1)
     )
-
-
-def test_any_other_family_is_slowed_by_a_wrapper() -> None:
-    series = FourierTrajectory(4, 0.9)
-    alpha = np.random.default_rng(5).normal(size=(9, 2))
-    times = np.linspace(0.0, series.duration / 0.5, 30)
-    for one, other in zip(
-        Slowed(series, 0.5).states(times, alpha),
-        series.slowed(0.5).states(times, alpha),
-        strict=True,
-    ):
-        assert one == pytest.approx(other, abs=1e-12)
-
-
-def test_samples_have_their_place_in_a_chain() -> None:
-    t = np.linspace(0.0, 1.0, 11)
-    family, alpha = through_samples(t, np.sin(t)[:, None])
-    chain = Chain((Segment("a", family, alpha), Segment("b", family, alpha)))
-    q, _, _ = chain.states(np.array([0.5, 1.5]))
-    assert q[0] == pytest.approx(q[1])

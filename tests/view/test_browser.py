@@ -54,26 +54,22 @@ def test_serves_a_page_until_it_ends(
         assert probe.connect_ex(("127.0.0.1", port)) != 0
 
 
-def test_a_port_that_is_taken(problem: Problem, segment: Segment, port: int) -> None:
+def test_an_address_of_another_machine_and_a_port_that_is_taken(
+    problem: Problem, segment: Segment, port: int
+) -> None:
     found: list[int] = []
+
+    def play(**serving: Any) -> None:
+        given = Serving(**serving)
+        play_in_browser(problem, [segment], given, lambda _, at: found.append(at), lambda: False)
+
+    with pytest.raises(ConfigError, match=r"Nothing can be served at 192\.0\.2\.1"):
+        play(host="192.0.2.1")
     with socket.socket() as other:
         other.bind(("127.0.0.1", port))
         other.listen()
-        play_in_browser(
-            problem,
-            [segment],
-            Serving(port=port),
-            lambda url, at: found.append(at),
-            lambda: False,
-        )
+        play(port=port)
     assert found[0] > port
-
-
-def test_an_address_of_another_machine(problem: Problem, segment: Segment) -> None:
-    with pytest.raises(ConfigError, match=r"Nothing can be served at 192\.0\.2\.1"):
-        play_in_browser(
-            problem, [segment], Serving(host="192.0.2.1"), lambda *_: None, lambda: False
-        )
 
 
 def test_the_player_moves_the_robot(problem: Problem, segment: Segment, port: int) -> None:
@@ -132,7 +128,7 @@ def test_the_readout(problem: Problem, segment: Segment) -> None:
     for track in instants.margins:
         assert track.name in margins
         assert f"{track.values[1]:.4g}" in margins
-        assert ("BROKEN" in margins) == any(t.values[1] < 0 for t in instants.margins)
+    assert ("BROKEN" in margins) == any(t.values[1] < 0 for t in instants.margins)
     assert instants.nearest is not None
     assert f"{1000 * instants.nearest.distances[1]:.1f} mm" in nearest_html(instants, 1)
     joints = joints_html(problem, instants, 1)

@@ -7,7 +7,6 @@ from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.coal_distances import CoalDistances
-from excite_cli.robot.model import Array
 from excite_cli.trajectory.fade import Segment
 from excite_cli.view.instants import Instants, instants_of
 
@@ -24,25 +23,18 @@ def states(problem: Problem, segment: Segment) -> States:
     return States(problem.kinematics, *segment.trajectory.states(TIMES, segment.coefficients))
 
 
-def _distances(problem: Problem, states: States) -> Array:
-    """Of all pairs of capsules by coal, and of all capsules and things, (T, P)."""
-    found = []
+def test_the_nearest_pair_is_the_nearest(
+    problem: Problem, instants: Instants, states: States
+) -> None:
+    nearest, found = instants.nearest, []
     for constraint in problem.constraints:
         if isinstance(constraint, SelfCollision):
             coal = CoalDistances(problem.robot, constraint.capsules, constraint.pairs.checked)
             found.append(coal.distances(states.q))
         elif isinstance(constraint, Surroundings):
             found.append(constraint.margins(states) + constraint.pairs.kept)
-    return np.hstack(found)
-
-
-def test_the_nearest_pair_is_the_nearest(
-    problem: Problem, instants: Instants, states: States
-) -> None:
-    nearest = instants.nearest
     assert nearest is not None
-    least = _distances(problem, states).min(axis=1)
-    np.testing.assert_allclose(nearest.distances, least, atol=1e-6)
+    np.testing.assert_allclose(nearest.distances, np.hstack(found).min(axis=1), atol=1e-6)
     assert len(set(nearest.labels)) > 2  # pairs of both kinds were nearest
     assert {len(capsules) for capsules in nearest.capsules} == {1, 2}
 
@@ -71,18 +63,11 @@ def test_margins_are_the_smallest_of_each_constraint(
     assert [track.name for track in instants.margins] == [c.name for c in problem.constraints]
     for track, constraint in zip(instants.margins, problem.constraints, strict=True):
         margins = constraint.margins(states)
-        shares = margins / constraint.scale
-        np.testing.assert_allclose(track.shares, shares.min(axis=1))
+        np.testing.assert_allclose(track.shares, (margins / constraint.scale).min(axis=1))
         column = constraint.labels.index(track.labels[7])
         assert track.values[7] == margins[7, column]
         assert track.units[7] == constraint.unit_of(column)
-
-
-def test_centre_of_mass(problem: Problem, instants: Instants, states: States) -> None:
     np.testing.assert_allclose(instants.mass, CenterOfMass(problem.robot).position(states))
     assert instants.zmp is None
-
-
-def test_index_at(instants: Instants) -> None:
     assert instants.index_at(0.29) == 2
     assert instants.index_at(99.0) == 40

@@ -1,6 +1,9 @@
+"""Surfaces, and the camera that looks at them."""
+
 import numpy as np
 import pytest
 
+from excite_cli.view.camera import fitted_camera
 from excite_cli.view.surface import (
     Triangles,
     ball_profile,
@@ -45,17 +48,12 @@ def test_a_box_keeps_its_edges_sharp() -> None:
 
 
 def test_a_ball_is_smooth() -> None:
-    surface = smooth_surface(round_triangles(ball_profile(2.0, 0.0)))
-    radial = np.einsum("kx,kx->k", surface.points / 2.0, surface.normals)
-    assert radial.min() > 0.995
-    rim_points = 48 * 15 + 2
-    assert len(surface.points) == rim_points
-
-
-def test_small_detail_is_dropped() -> None:
-    fine = round_triangles(ball_profile(1.0, 0.0))
-    coarse = smooth_surface(fine, cell=0.3)
-    assert len(coarse.faces) < len(fine.faces) / 3
+    ball = round_triangles(ball_profile(1.0, 0.0))
+    surface = smooth_surface(ball)
+    assert np.einsum("kx,kx->k", surface.points, surface.normals).min() > 0.995
+    assert len(surface.points) == 48 * 15 + 2
+    coarse = smooth_surface(ball, cell=0.3)
+    assert len(coarse.faces) < len(ball.faces) / 3, "small detail is dropped"
     assert np.linalg.norm(coarse.points, axis=1).min() > 0.85
 
 
@@ -76,3 +74,34 @@ def test_turn_to(direction: list[float]) -> None:
     length = np.linalg.norm(direction)
     if length:
         np.testing.assert_allclose(turn[:, 2], np.array(direction) / length)
+
+
+POINTS = np.random.default_rng(1).uniform([-1, -0.3, 0], [0.4, 2, 1.5], (60, 3))
+
+
+@pytest.mark.parametrize("view", [(0.0, 0.0), (35.0, 18.0), (250.0, 80.0), (-70.0, -30.0)])
+@pytest.mark.parametrize("size", [(640, 480), (300, 900)])
+def test_everything_is_seen_and_fills_the_picture(
+    view: tuple[float, float], size: tuple[int, int]
+) -> None:
+    camera = fitted_camera(POINTS, size, *view, fill=0.9)
+    places = camera.project(POINTS)
+    spans = np.ptp(places, axis=0) / size
+    assert places.min() > 0
+    assert (places < size).all()
+    assert 0.85 < spans.max() <= 0.91
+    np.testing.assert_allclose(
+        (places.min(axis=0) + places.max(axis=0)) / 2, np.array(size) / 2, atol=0.02 * max(size)
+    )
+
+
+def test_azimuth_elevation_and_rays() -> None:
+    camera = fitted_camera(POINTS, (100, 100), 90, 0)
+    assert camera.eye[1] > 2.0  # from +y
+    low, high = camera.project(np.array([[0, 0, 0.0], [0, 0, 1.0]]))
+    assert high[1] < low[1]  # z is up
+    left, right = camera.project(np.array([[0.3, 0, 0.0], [-0.3, 0, 0.0]]))
+    assert left[0] < right[0]
+    places, towards = camera.project(POINTS), POINTS - camera.eye
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    np.testing.assert_allclose(camera.rays(places[:, 0], places[:, 1]), towards, atol=1e-12)

@@ -2,6 +2,7 @@
 
 import subprocess
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -34,6 +35,8 @@ def given(folder: Path, text: str) -> Urdf:
 def test_a_file_that_ends_the_library_is_one_message(tmp_path: Path, text: str, words: str) -> None:
     with pytest.raises(RobotError, match=rf"^robot\.x: reading it as Lethal .*{words}"):
         given(tmp_path, text)
+    with pytest.raises(MissingExtraError, match=r"^pip install something$"):
+        given(tmp_path, "missing")
 
 
 def test_a_file_that_never_ends_is_given_up(
@@ -46,11 +49,6 @@ def test_a_file_that_never_ends_is_given_up(
     monkeypatch.setattr(module, "_SLOWEST", 0.01)
     with pytest.raises(RobotError, match="takes too long"):
         given(tmp_path, "run on")
-
-
-def test_errors_keep_their_kind(tmp_path: Path) -> None:
-    with pytest.raises(MissingExtraError, match=r"^pip install something$"):
-        given(tmp_path, "missing")
 
 
 def test_what_libraries_print_and_log_is_lost(
@@ -77,29 +75,12 @@ def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return path
 
 
-class Made:
-    """How often a process was started for a conversion."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.count, run = 0, subprocess.run
-
-        def counted(*words: object, **settings: object) -> object:
-            self.count += 1
-            return run(*words, **settings)
-
-        monkeypatch.setattr(module.subprocess, "run", counted)
-
-
 @pytest.fixture
-def made(robot: Path, monkeypatch: pytest.MonkeyPatch) -> Made:
-    return Made(monkeypatch)
-
-
-def test_the_same_files_are_converted_once(robot: Path, made: Made) -> None:
-    first = load_description(str(robot))
-    assert made.count == 0
-    assert first.xml.count("<link") == 2
-    assert "file://" in first.xml
+def made(robot: Path, monkeypatch: pytest.MonkeyPatch) -> Mock:
+    """Called as often as a process was started for a conversion."""
+    counted = Mock(side_effect=subprocess.run)
+    monkeypatch.setattr(module.subprocess, "run", counted)
+    return counted
 
 
 @pytest.mark.parametrize(
@@ -111,22 +92,26 @@ def test_the_same_files_are_converted_once(robot: Path, made: Made) -> None:
     ],
 )
 def test_any_file_that_changes_is_seen(
-    robot: Path, made: Made, name: str, text: str, seen: str
+    robot: Path, made: Mock, name: str, text: str, seen: str
 ) -> None:
+    """The same files are converted once."""
     before = load_description(str(robot)).xml
+    assert made.call_count == 0
+    assert before.count("<link") == 2
+    assert "file://" in before
     (robot.parent / name).write_text(text)
     after = load_description(str(robot)).xml
-    assert made.count == 1
+    assert made.call_count == 1
     assert after != before
     assert seen in after
 
 
-def test_a_mesh_of_the_cache_that_is_damaged_is_made_anew(robot: Path, made: Made) -> None:
+def test_a_mesh_of_the_cache_that_is_damaged_is_made_anew(robot: Path, made: Mock) -> None:
     (mesh,) = (robot.parent / "cache" / "excite" / "meshes").glob("*.stl")
     content = mesh.read_bytes()
     mesh.write_bytes(content[:-1] + b"x")
     load_description(str(robot))
-    assert made.count == 1
+    assert made.call_count == 1
     assert mesh.read_bytes() == content
 
 

@@ -80,10 +80,8 @@ def test_meshes_are_scaled_and_placed(tmp_path: Path) -> None:
     corners = " ".join(f"{x} {y} {z}" for x in (0, 1) for y in (0, 2) for z in (0, 3))
     asset = f'<asset><mesh name="m" vertex="{corners}" scale="0.1 0.1 0.1"/></asset>'
     geom = '<geom type="mesh" mesh="m" pos="0.5 0 0" euler="0 0 90" mass="1"/>'
-    path = _written(
-        tmp_path, f'<body name="a"><joint name="j" range="-90 90"/>{geom}</body>', asset
-    )
-    robot = build_robot(RobotSpec(urdf=str(path)))
+    body = f'<body name="a"><joint name="j" range="-90 90"/>{geom}</body>'
+    robot = build_robot(RobotSpec(urdf=str(_written(tmp_path, body, asset))))
     (shape,) = link_shapes(robot, collision_model(robot))
     np.testing.assert_allclose(shape.points.min(axis=0), [0.3, 0.0, 0.0], atol=1e-6)
     np.testing.assert_allclose(shape.points.max(axis=0), [0.5, 0.1, 0.3], atol=1e-6)
@@ -108,13 +106,6 @@ def test_what_a_urdf_cannot_hold_is_told(tmp_path: Path) -> None:
         assert words in told
 
 
-def test_a_robot_that_floats_is_its_own_root(tmp_path: Path) -> None:
-    path = _written(tmp_path, _body("trunk", _body("a"), "<freejoint/>"))
-    robot = build_robot(RobotSpec(urdf=str(path), base="floating", rows=("base", "joints")))
-    assert robot.joint_names == ("a_j",)
-    assert robot.model.inertias[1].mass == 1.0
-
-
 @pytest.mark.parametrize(
     ("bodies", "words"),
     [
@@ -127,10 +118,13 @@ def test_what_is_no_robot_is_refused(tmp_path: Path, bodies: str, words: str) ->
         load_description(str(_written(tmp_path, bodies)))
 
 
-def test_joints_that_their_damping_holds_stay(tmp_path: Path) -> None:
+def test_what_floats_and_what_damping_holds(tmp_path: Path) -> None:
+    """A robot that floats is its own root; a joint that cannot be turned stays."""
+    path = _written(tmp_path, _body("trunk", _body("a"), "<freejoint/>"))
+    robot = build_robot(RobotSpec(urdf=str(path), base="floating", rows=("base", "joints")))
+    assert robot.joint_names == ("a_j",)
+    assert robot.model.inertias[1].mass == 1.0
     held = '<joint name="{}_j" axis="0 1 0" damping="1e11"/>'
-    robot = build_robot(
-        RobotSpec(urdf=str(_written(tmp_path, _body("a", _body("b"), held)))),
-    )
+    robot = build_robot(RobotSpec(urdf=str(_written(tmp_path, _body("a", _body("b"), held)))))
     assert robot.joint_names == ("b_j",)
     assert "their damping holds these joints: a_j" in robot.description.notes

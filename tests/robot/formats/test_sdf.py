@@ -114,44 +114,35 @@ def test_friction_couplings_and_turns_without_end(tmp_path: Path) -> None:
     assert 'lower="-1000000000.0"' in found.xml
 
 
+BASE, JOINT = link("base"), joint("j", "base", "a")
+
+
 @pytest.mark.parametrize(
     ("parts", "words"),
     [
-        ((link("base"),), "no model in it has a joint that could be moved"),
+        ((BASE,), "no model in it has a joint that could be moved"),
         (
-            (link("base"), joint("j", "base", "none")),
+            (BASE, joint("j", "base", "none")),
             "its SDF cannot be read: joint 'j' has the child 'none', no link of it",
         ),
+        ((BASE, JOINT, link("a", "0 0 0")), "the pose '0 0 0' is not six numbers"),
+        ((BASE, JOINT, link("a", "0 0 nan 0 0 0")), "is not finite"),
         (
-            (link("base"), joint("j", "base", "a"), link("a", "0 0 0")),
-            "the pose '0 0 0' is not six numbers",
-        ),
-        (
-            (link("base"), joint("j", "base", "a"), link("a", "0 0 nan 0 0 0")),
-            "is not finite",
-        ),
-        (
-            (link("base"), joint("j", "base", "a"), link("a"), "<include><uri>x</uri></include>"),
+            (BASE, JOINT, link("a"), "<include><uri>x</uri></include>"),
             "is made of other models .*which is not read",
         ),
         (
-            (
-                link("base"),
-                joint("j", "base", "a"),
-                link("a").replace("<pose>", '<pose relative_to="j">'),
-            ),
+            (BASE, JOINT, link("a").replace("<pose>", '<pose relative_to="j">')),
             "its frames go round in a circle",
         ),
+        (None, "What it includes is not read: give that file"),
     ],
-    ids=["no joint", "no child", "short pose", "nan", "include", "circle"],
 )
-def test_what_is_no_robot_is_refused(tmp_path: Path, parts: tuple[str, ...], words: str) -> None:
+def test_what_is_no_robot_is_refused(
+    tmp_path: Path, parts: tuple[str, ...] | None, words: str
+) -> None:
+    if parts is None:  # nothing but an include
+        path = tmp_path / "robot.sdf"
+        path.write_text('<sdf version="1.6"><world name="w"><include/></world></sdf>')
     with pytest.raises(RobotError, match=rf"robot\.sdf: .*{words}"):
-        described(tmp_path, *parts)
-
-
-def test_a_world_of_includes_says_what_to_give(tmp_path: Path) -> None:
-    path = tmp_path / "w.sdf"
-    path.write_text('<sdf version="1.6"><world name="w"><include/></world></sdf>')
-    with pytest.raises(RobotError, match="What it includes is not read: give that file"):
-        load_description(str(path))
+        described(tmp_path, *parts) if parts else load_description(str(path))

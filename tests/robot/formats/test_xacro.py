@@ -36,8 +36,9 @@ def _arm(folder: Path, package: str = "arm_description", mass: str = "2") -> Pat
 
 
 def test_macros_packages_and_arguments(tmp_path: Path) -> None:
-    described = load_description(str(_arm(tmp_path)))
+    described = load_description(str(_arm(tmp_path, mass="$(eval 2 * length + 1)")))
     assert described.xml.count("<joint") == 2
+    assert '<mass value="1.8"' in described.xml
     assert described.name == "arm"
     short = load_description(str(_arm(tmp_path)), arguments={"length": "0.2", "hand": "false"})
     assert short.xml.count("<joint") == 1
@@ -52,6 +53,8 @@ def test_ros_package_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     moved.write_text(path.read_text())
     with pytest.raises(RobotError, match="the package 'arm_description' was not found"):
         load_description(str(moved))
+    given = load_description(str(moved), ("elsewhere/src",), tmp_path)
+    assert given.xml.count("<joint") == 2
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "elsewhere" / "src"))
     there = tmp_path / "elsewhere" / "src" / "arm"
     with pytest.raises(OutsideError, match=f"the package 'arm_description' in {there}"):
@@ -59,14 +62,6 @@ def test_ros_package_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     found = load_description(str(moved), (str(there),))
     assert found.xml.count("<joint") == 2
     assert f"the package 'arm_description' is {there}" in found.notes
-
-
-def test_folders_that_are_given(tmp_path: Path) -> None:
-    path = _arm(tmp_path / "elsewhere")
-    moved = tmp_path / "arm.xacro"
-    moved.write_text(path.read_text())
-    found = load_description(str(moved), ("elsewhere/src",), tmp_path)
-    assert found.xml.count("<joint") == 2
 
 
 @pytest.mark.parametrize(
@@ -88,11 +83,6 @@ def test_expressions_that_are_programs_are_refused(
     with pytest.raises(RobotError, match="xacro cannot expand it"):
         load_description(str(path))
     assert not (tmp_path / "written").exists()
-
-
-def test_arithmetic_of_eval(tmp_path: Path) -> None:
-    path = _arm(tmp_path, mass="$(eval 2 * length + 1)")
-    assert '<mass value="1.8"' in load_description(str(path)).xml
 
 
 def test_a_package_that_lost_its_name_is_the_one_the_file_lies_in(tmp_path: Path) -> None:
