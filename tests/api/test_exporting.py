@@ -23,14 +23,8 @@ def test_what_the_format_cannot_hold_is_one_sentence(loop: Loop, tmp_path: Path)
     target = tmp_path / "x.csv"
     with pytest.raises(FileError, match=r"fit\.h5 is a model: it cannot be exported as csv"):
         export_file(loop.fit, "csv", target)
-    with pytest.raises(FileError, match=r"arm\.h5 is no model: it cannot be exported as urdf"):
-        export_file(str(loop.result), "urdf", target)
-    with pytest.raises(FileError, match=r"There is no file none\.h5"):
-        export_file("none.h5", "csv", target)
     with pytest.raises(ConfigError, match=r"--format cvs: unknown\. Did you mean 'csv'"):
         export_file(loop.result, "cvs", target)
-    with pytest.raises(FileError, match="has no motion 9"):
-        export_file(loop.result, "csv", target, chosen=[9])
     with pytest.raises(ConfigError, match="--periods 0: a motion is played once or more"):
         export_file(loop.result, "csv", target, periods=0)
     assert not list(tmp_path.iterdir())
@@ -67,13 +61,6 @@ def test_a_motion_planned_with_a_fit_is_entered_from_rest(loop: Loop, tmp_path: 
     plan(problem, output=tmp_path / "arm.h5")
     found = export_file(tmp_path / "arm.h5", "csv", tmp_path / "arm.csv", rate=50.0, start={})
     assert found.motions[0].durations.keys() == {"entry", "motion", "return"}
-
-
-def test_a_fit_is_written_as_a_model(loop: Loop, tmp_path: Path) -> None:
-    found = export_file(loop.fit, "urdf", tmp_path / "arm.urdf")
-    assert found.paths == (tmp_path / "arm.urdf",)
-    assert not found.motions
-    assert "<robot" in found.paths[0].read_text(encoding="utf-8")
 
 
 def test_joints_in_another_order_are_not_exported(loop: Loop, tmp_path: Path) -> None:
