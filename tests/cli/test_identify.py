@@ -60,7 +60,8 @@ def test_every_output_is_written_and_can_be_used(
 ) -> None:
     outputs = {"-o": "fit.h5", "--urdf": "new.urdf", "--mjcf": "new.xml", "--parameters": "p.yaml"}
     words = [word for pair in outputs.items() for word in pair]
-    words += ["--held-out", "r1"]
+    words += ["--held-out", "r1", "--overwrite"]
+    (excite.folder / "fit.h5").write_text("to be replaced")
     run = excite.good("identify", folder / CONFIG, folder / "data.h5", *words)
     assert "Error of the torque" in run.stdout
     assert "identifiable" in run.stdout
@@ -76,25 +77,17 @@ def test_every_output_is_written_and_can_be_used(
     assert (model.dof_damping > 0).all()
 
 
-def test_files_are_not_replaced_unless_said(folder: Path, excite: Program) -> None:
-    kept = excite.folder / "fit.h5"
-    kept.write_text("mine")
-    words = ("identify", folder / CONFIG, folder / "data.h5", "-o", kept)
-    assert "--overwrite" in excite.refused(*words)
-    assert kept.read_text() == "mine"
-    excite.good(*words, "--overwrite")
-    assert h5py.is_hdf5(kept)
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         (("--held-out", "r7"), "there is no run 'r7'"),
+        (("-o", "there"), "there exists already. Give another name, or replace it with"),
         (("-o", "x.h5", "--urdf", "x.h5"), "both name x.h5"),
     ],
 )
 def test_bad_input_gives_one_message(
     folder: Path, excite: Program, words: tuple[str, ...], message: str
 ) -> None:
+    (excite.folder / "there").write_text("mine")
     assert message in excite.refused("identify", folder / CONFIG, folder / "data.h5", *words)
-    assert list(excite.folder.iterdir()) == []
+    assert [path.read_text() for path in excite.folder.iterdir()] == ["mine"]

@@ -18,8 +18,16 @@ from tests.proposal.test_shapes import FINGERS, shape, with_gripper
 
 def test_a_config_that_works_unedited(excite: Program, tmp_path: Path) -> None:
     arm(tmp_path, 'lower="-2" upper="2" velocity="0" effort="1000"')
-    answer = excite.answer("init", "--urdf", "robot.urdf", "-o", "arm.yaml")
+    (tmp_path / "arm.yaml").write_text("mine")
+    words = ("init", "--urdf", "robot.urdf", "-o", "arm.yaml")
+    assert "arm.yaml exists already" in excite.refused(*words)
+    assert (tmp_path / "arm.yaml").read_text() == "mine"
+    answer = excite.answer(*words, "--overwrite")
     assert answer["joints"] == ["shoulder", "elbow"]
+    told = excite.good("init", "--urdf", "robot.urdf").stdout
+    assert "moves 2 joints" in told
+    assert "shoulder: the URDF gives 0 rad/s; 3.1 rad/s assumed" in told
+    assert "excite optimize robot.yaml" in told
     assert load_spec(tmp_path / "arm.yaml").robot.urdf == "robot.urdf"
     excite.good("optimize", "arm.yaml", "-o", "arm.h5", *BRIEF)
     excite.good("check", "arm.yaml", "arm.h5")
@@ -71,23 +79,6 @@ def test_a_terminal_is_asked(tmp_path: Path, answer: str, status: int) -> None:
     assert process.wait() == status
     assert b"outside its own folder. [y/N]" in said
     assert (tmp_path / "arm.yaml").exists() is (status == 0)
-
-
-def test_it_says_what_it_chose(excite: Program, tmp_path: Path) -> None:
-    arm(tmp_path, 'lower="-2" upper="2" velocity="0" effort="50"')
-    told = excite.good("init", "--urdf", "robot.urdf").stdout
-    assert "moves 2 joints" in told
-    assert "shoulder: the URDF gives 0 rad/s; 3.1 rad/s assumed" in told
-    assert "excite optimize robot.yaml" in told
-
-
-def test_nothing_is_overwritten_unasked(excite: Program, tmp_path: Path) -> None:
-    arm(tmp_path)
-    (tmp_path / "robot.yaml").write_text("mine")
-    assert "robot.yaml exists already" in excite.refused("init", "--urdf", "robot.urdf")
-    assert (tmp_path / "robot.yaml").read_text() == "mine"
-    excite.good("init", "--urdf", "robot.urdf", "--overwrite")
-    assert (tmp_path / "robot.yaml").read_text() != "mine"
 
 
 @pytest.mark.parametrize(

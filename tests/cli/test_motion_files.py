@@ -26,12 +26,6 @@ def written(
     return name
 
 
-def test_a_good_file_is_judged(excite: Program) -> None:
-    answer = excite.answer("check", SMOKE, written(excite.folder, "m.csv"), "--no-meshes")
-    assert answer["ok"] is True
-    assert answer["motions"][0]["violations"] == 0
-
-
 @pytest.mark.parametrize(
     ("changes", "words"),
     [

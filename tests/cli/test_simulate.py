@@ -33,30 +33,22 @@ def simulated(
     return Program(folder, cache).answer("simulate", *arguments), path
 
 
-def test_the_answer_names_runs_effects_and_file(simulated: tuple[Any, Path]) -> None:
-    answer, path = simulated
-    assert [run["name"] for run in answer["runs"]] == ["motion_1", "motion_2"]
-    assert all(max(run["tracking_error"].values()) < 0.02 for run in answer["runs"])
-    planted = [effect for effect in answer["effects"] if not effect["declared"]]
-    assert [(e["kind"], e["joints"]) for e in planted] == [
-        ("coulomb_friction", ["elbow"]),
-        ("payload", ["slide"]),
-        ("covariate_offset", ["elbow"]),
-    ]
-    assert planted[2]["covariate"] == "temp"
-    assert planted[0]["parameters"]["coulomb"] == {"value": 1.5, "unit": "N·m"}
-    assert planted[1]["runs"] == ["motion_2"]
-    assert answer["output"] == str(path)
-
-
 def test_the_file_is_measured_data_with_its_truth(
     simulated: tuple[Any, Path], two_motions: Run
 ) -> None:
     answer, path = simulated
+    assert answer["output"] == str(path)
+    assert [run["name"] for run in answer["runs"]] == ["motion_1", "motion_2"]
+    assert all(max(run["tracking_error"].values()) < 0.02 for run in answer["runs"])
+    friction, payload, offset = (each for each in answer["effects"] if not each["declared"])
+    assert (friction["kind"], friction["joints"]) == ("coulomb_friction", ["elbow"])
+    assert friction["parameters"]["coulomb"] == {"value": 1.5, "unit": "N·m"}
+    assert (payload["kind"], payload["joints"]) == ("payload", ["slide"])
+    assert payload["runs"] == ["motion_2"]
+    assert (offset["kind"], offset["covariate"]) == ("covariate_offset", "temp")
     with h5py.File(path) as file:
         names = list(file.attrs["joint_names"])
-        truth = json.loads(file.attrs["truth"])
-        assert truth["effects"] == answer["effects"]
+        assert json.loads(file.attrs["truth"])["effects"] == answer["effects"]
         assert file.attrs["seed"] == 1
         assert json.loads(file.attrs["settings"])["torque_noise"] == 0.01
         assert "smoke_arm.urdf" in file.attrs["config"]

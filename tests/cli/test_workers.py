@@ -2,9 +2,8 @@
 
 import json
 
-import h5py
-import numpy as np
-
+from excite_cli.store.result_file import read_result
+from tests.api.test_on_disk import same
 from tests.cli.program import SMOKE, Program
 
 BRIEF = (
@@ -24,23 +23,8 @@ def test_starts_shared_by_two_are_stored_alike(excite: Program) -> None:
     for answer in (alone, shared):
         del answer["motions"][0]["seconds"], answer["output"]
     assert alone == shared
-    compared: list[str] = []
-    with (
-        h5py.File(excite.folder / "alone.h5") as first,
-        h5py.File(excite.folder / "shared.h5") as second,
-    ):
-
-        def compare(name: str, item: h5py.Dataset | h5py.Group) -> None:
-            compared.append(name)
-            for key, value in item.attrs.items():
-                if key != "seconds":
-                    assert np.array_equal(second[name].attrs[key], value), f"{name}: {key}"
-            if isinstance(item, h5py.Dataset):
-                assert np.array_equal(item[()], second[name][()]), name
-
-        first.visititems(compare)
-        compare("/", first)
-    assert "motions/1/coefficients" in compared
+    first, second = (read_result(excite.folder / f"{name}.h5") for name in ("alone", "shared"))
+    assert same(first, second)
 
 
 def test_two_places_are_one_too_many(excite: Program) -> None:
