@@ -1,6 +1,5 @@
 """What functions of the library do beside the mathematics: notes, files, claims."""
 
-import json
 import logging
 import subprocess
 import sys
@@ -23,9 +22,7 @@ from excite_cli import (
     read_result,
     run_study,
     save_proposal,
-    verify_gradient,
 )
-from excite_cli.api.schema import config_schema
 from excite_cli.claim import claim, leave
 from tests.api.conftest import BRIEF, ROOT, SMOKE, Loop
 
@@ -107,11 +104,6 @@ def test_a_study_from_python(tmp_path: Path) -> None:
     (record,) = run_study(SMOKE, vary=["seed=3"], output=str(tmp_path / "s"), overrides=BRIEF)
     assert record.files == ("seed=3.motions.h5",)
     assert read_result(tmp_path / "s" / record.files[0]).seed == 3
-
-
-def test_the_gradient_and_the_schema() -> None:
-    assert verify_gradient(load_problem(SMOKE, BRIEF)).passed
-    assert "trajectory" in json.loads(config_schema())["properties"]
 
 
 def test_a_file_that_is_read_first_is_shown_as_a_table(loop: Loop) -> None:

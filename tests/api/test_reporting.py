@@ -12,7 +12,7 @@ from tests.diagnosis.synthetic_diagnosis import make_diagnosis
 def test_what_is_no_report_is_one_sentence(loop: Loop, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     for given, words in (
-        (loop.data, r"data\.h5.*A report is made of results"),
+        (loop.data, r"data\.h5 holds measured data.*A report is made of results"),
         (str(SMOKE), r"smoke\.yaml.*A report is made of results"),
         ([], "nothing to report"),
         ([loop.fit, str(loop.fit)], "is given twice"),

@@ -204,17 +204,3 @@ def test_a_tighter_config_is_checked_as_it_stands(excite: Program, two_motions: 
     assert "BROKEN" in run.stdout
     for line in run.stdout.splitlines():
         assert ("BROKEN" in line) == ("joint_velocity" in line)
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ("robot.joints=[elbow, slide]", "moves other joints"),
-        ("trajectory.harmonics=3", "another trajectory"),
-    ],
-)
-def test_a_file_of_another_problem(
-    excite: Program, two_motions: Run, change: str, words: str
-) -> None:
-    changes = ("--set", change, "--set", "constraints={}")
-    assert words in excite.refused("check", SMOKE, two_motions.path, *changes)

@@ -90,9 +90,6 @@ def test_a_motion_of_others_is_written_in_another_format(excite: Program) -> Non
     assert answer["motions"][0]["instants"] == 31
     tree = yaml.safe_load((excite.folder / "m.yaml").read_text())
     assert tree["points"][10]["positions"] == pytest.approx([1.0])
-    for option in (("--slow", "0.5"), ("--entry",)):
-        told = excite.refused("export", "m.csv", "-f", "npz", *option)
-        assert "does not say which robot and limits" in told
 
 
 @pytest.mark.parametrize(
@@ -100,7 +97,6 @@ def test_a_motion_of_others_is_written_in_another_format(excite: Program) -> Non
     [
         (("-f", "cvs"), "--format cvs: unknown. Did you mean 'csv'?"),
         (("-f", "urdf"), "is no model: it cannot be exported as urdf. Its formats: csv, ros2"),
-        (("-f", "csv", "--motion", "7"), "has no motion 7; it has 1, 2"),
         (("-f", "csv", "--motion", "x"), "--motion x: give the number"),
         (("-f", "csv", "--rate", "0"), "--rate 0: give instants per second"),
         (("-f", "csv", "--rate", "1e6", "--periods", "9"), "up to 2,000,000 are written"),

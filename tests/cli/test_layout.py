@@ -42,13 +42,10 @@ FIGURES = Table(
 )
 
 
-def test_with_room_every_row_is_a_line() -> None:
+def test_with_room_every_row_is_a_line_then_words_wrap_first() -> None:
     (lines,) = parts_of(FIGURES, 80)
     assert len(lines) == 4
     assert lines[2].split() == [word for cell in FIGURES.rows[0] for word in cell.split()]
-
-
-def test_words_wrap_first() -> None:
     (lines,) = parts_of(FIGURES, 73)
     assert max(map(len, lines)) <= 73
     assert len(lines) > 4

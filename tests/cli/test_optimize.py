@@ -101,13 +101,6 @@ def test_a_prior_makes_the_stack_better_than_the_motion(excite: Program, two_mot
     )
 
 
-def test_a_prior_of_another_robot_is_refused(excite: Program, two_motions: Run) -> None:
-    others = "robot.joints=[shoulder_pitch, elbow, wrist_roll, slide]"
-    told = excite.refused("optimize", SMOKE, "--set", others, *BRIEF, "--prior", two_motions.path)
-    assert f"--prior {two_motions.path} cannot be stacked" in told
-    assert list(excite.folder.iterdir()) == []
-
-
 # What nothing can meet, with all other constraints that could be named instead.
 INFEASIBLE = {
     "balance": [

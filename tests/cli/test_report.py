@@ -91,18 +91,6 @@ def test_what_cannot_be_written_or_read(
     assert {(excite.folder / name).read_text() for name in OUTPUTS[1:]} == {"mine"}
 
 
-def test_a_file_given_twice(two_joints: Path, excite: Program) -> None:
-    assert "is given twice" in excite.refused("report", two_joints, two_joints)
-
-
-def test_measured_data_are_no_report(excite: Program) -> None:
-    with h5py.File(excite.folder / "measured.h5", "w") as file:
-        file.attrs["simulated"] = True
-    message = excite.refused("report", "measured.h5")
-    assert "holds measured data" in message
-    assert "excite diagnose" in message
-
-
 def test_a_urdf_that_is_not_found_asks_for_the_config(two_joints: Path, excite: Program) -> None:
     shutil.copy(two_joints, excite.folder / "moved.h5")
     with h5py.File(excite.folder / "moved.h5", "a") as file:

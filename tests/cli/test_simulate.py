@@ -129,11 +129,3 @@ def test_noise_of_the_sensors_of_a_standing_robot(excite: Program, two_motions: 
     noise = (found["b"] - found["a"]).std(axis=0)
     planted = np.repeat([3.0, 0.2, 0.1, 0.01], 3)
     np.testing.assert_allclose(noise, planted, rtol=0.1)
-
-
-def test_a_config_that_converts_is_warned_about(excite: Program, two_motions: Run) -> None:
-    run = excite.good(
-        "simulate", SMOKE, two_motions.path, "-o", "x.h5", "--motion", "1", "--rate", "100",
-        "--set", "measurement.torque=motor", "--set", "measurement.gear_ratio=100",
-    )  # fmt: skip
-    assert "converts recorded positions or torques" in run.stderr
