@@ -13,18 +13,13 @@ from excite_cli import (
     Problem,
     Result,
     check,
-    compare_random,
-    describe_robot,
     load_motions,
     load_problem,
     motions_of,
     plan,
     read_result,
-    run_study,
-    save_proposal,
 )
-from excite_cli.claim import claim, leave
-from tests.api.conftest import BRIEF, ROOT, SMOKE, Loop
+from tests.api.conftest import BRIEF, SMOKE, Loop
 
 
 def test_nothing_is_printed_and_notes_go_to_the_log(
@@ -60,17 +55,6 @@ def test_a_plan_is_gone_on_with(problem: Problem, stored: Path, tmp_path: Path) 
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_random_motions_stand_beside(problem: Problem, result: Result, tmp_path: Path) -> None:
-    path = tmp_path / "both.h5"
-    found = compare_random(problem, result, candidates=2, seconds=0, output=path)
-    assert found.baseline.candidates == 2
-    assert read_result(path).random_candidates == (2, found.baseline.admissible)
-    assert [each.name for each in tmp_path.iterdir()] == ["both.h5"]
-    claim(path)  # which none has left
-    leave(path)
-    assert found.seconds == pytest.approx(sum(m.seconds for m in result.motions))
-
-
 def test_motions_of_any_origin_are_the_same(problem: Problem, result: Result, stored: Path) -> None:
     expected = [motion.coefficients.tolist() for motion in motions_of(result)]
     for given in (result, motions_of(result), motions_of(result)[0], stored, str(stored)):
@@ -89,21 +73,6 @@ def test_inspections_are_a_mapping(problem: Problem, result: Result, stored: Pat
     )
     assert seen == [(0, 1)]
     assert same["motion_1"].margins == found["motion_1"].margins
-
-
-def test_a_robot_and_its_config(tmp_path: Path) -> None:
-    urdf = ROOT / "data" / "smoke_arm.urdf"
-    described = describe_robot(str(urdf))
-    assert [joint.kind for joint in described.joints].count("prismatic") == 1
-    answer = save_proposal(urdf, tmp_path / "arm.yaml", tell=lambda note: None)
-    assert answer.data["output"] == str(tmp_path / "arm.yaml")
-    assert load_problem(tmp_path / "arm.yaml").robot.joint_names == tuple(answer.data["joints"])
-
-
-def test_a_study_from_python(tmp_path: Path) -> None:
-    (record,) = run_study(SMOKE, vary=["seed=3"], output=str(tmp_path / "s"), overrides=BRIEF)
-    assert record.files == ("seed=3.motions.h5",)
-    assert read_result(tmp_path / "s" / record.files[0]).seed == 3
 
 
 def test_a_file_that_is_read_first_is_shown_as_a_table(loop: Loop) -> None:

@@ -21,6 +21,7 @@ def test_random_beside_optimised(excite: Program, two_motions: Run) -> None:
     ]
     random = answer["random"]
     assert [m["index"] for m in random] == [1, 2]
+    assert [path.name for path in excite.folder.iterdir()] == ["both.h5"]  # no claim is left
     both = read_result(excite.folder / "both.h5")
     objective = build_problem(load_spec(SMOKE, ["constraints={}"]), SMOKE.parent).objective()
     blocks = [objective.block(motion.coefficients) for motion in both.random]

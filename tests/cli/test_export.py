@@ -9,16 +9,12 @@ import pytest
 import yaml
 
 from excite_cli.config.load import load_spec
-from excite_cli.dynamics.regressor import standard_parameters
-from excite_cli.effects.catalogue import declared_effects
-from excite_cli.measurement.hdf5_writer import write_dataset
 from excite_cli.measurement.motion_files import read_own_motion
 from excite_cli.robot.model import build_robot
 from excite_cli.store.result_file import read_result
 from excite_cli.trajectory.fourier import FourierTrajectory
 from tests.cli.conftest import Run
 from tests.cli.program import BRIEF, SMOKE, Program
-from tests.identification.synthetic import measured
 
 SERIES = FourierTrajectory(4, 1.0471975511965976)
 JOINTS = ["shoulder_yaw", "shoulder_pitch", "elbow", "wrist_roll", "slide"]
@@ -120,30 +116,6 @@ def test_bad_files(excite: Program, name: str, words: str) -> None:
     for each in ("bad.h5", "bad.x"):
         (excite.folder / each).write_text("nothing")
     assert words in excite.refused("export", name, "-f", "csv")
-
-
-def test_a_fit_gives_the_same_models_as_identification(excite: Program) -> None:
-    robot_part = yaml.safe_load(SMOKE.read_text())["robot"]
-    robot_part["urdf"] = str((SMOKE.parent / robot_part["urdf"]).resolve())
-    problem = {"robot": robot_part, "effects": [{"kind": "viscous_friction"}]}
-    (excite.folder / "arm.yaml").write_text(yaml.safe_dump(problem))
-    robot = build_robot(load_spec(excite.folder / "arm.yaml").robot)
-    effects = declared_effects(load_spec(excite.folder / "arm.yaml").effects, robot)
-    phi, values = standard_parameters(robot), np.linspace(0.5, 2.0, robot.n)
-    data = measured(robot, phi, effects, values, noise=0.1, seconds=4.0, seeds=(1, 2, 3))
-    write_dataset(excite.folder / "data.h5", data, {})
-    models = {"urdf": "a.urdf", "mjcf": "a.xml", "yaml": "p.yaml"}
-    wanted = ("--urdf", "a.urdf", "--mjcf", "a.xml", "--parameters", "p.yaml")
-    excite.good("identify", "arm.yaml", "data.h5", "-o", "fit.h5", *wanted)
-    for name, made in models.items():
-        excite.good("export", "fit.h5", "-f", name, "-o", "again")
-        again = excite.folder / "again"
-        assert again.read_text() == (excite.folder / made).read_text()
-        again.unlink()
-    told = excite.refused("export", "fit.h5", "-f", "csv")
-    assert "fit.h5 is a model: it cannot be exported as csv. Its formats: urdf, mjcf, y" in told
-    (excite.folder / "arm.yaml").unlink()
-    assert "a.urdf exists" in excite.refused("export", "fit.h5", "-f", "urdf", "-o", "a.urdf")
 
 
 def _planned(excite: Program, *more: str | Path) -> tuple[Any, str]:

@@ -1,5 +1,6 @@
 """`excite identify` as a user runs it."""
 
+import shutil
 from pathlib import Path
 
 import h5py
@@ -55,21 +56,30 @@ def test_json_holds_what_scripts_rely_on(folder: Path, robot: Robot, excite: Pro
     assert 0 < error["mean_relative"] < 0.2
 
 
-def test_every_output_is_written_and_can_be_used(
+def test_every_output_is_written_can_be_used_and_exported_again(
     folder: Path, robot: Robot, excite: Program
 ) -> None:
-    outputs = {"-o": "fit.h5", "--urdf": "new.urdf", "--mjcf": "new.xml", "--parameters": "p.yaml"}
-    words = [word for pair in outputs.items() for word in pair]
-    words += ["--held-out", "r1", "--overwrite"]
+    outputs = {"urdf": "new.urdf", "mjcf": "new.xml", "yaml": "p.yaml"}
+    words = ["-o", "fit.h5", "--urdf", "new.urdf", "--mjcf", "new.xml", "--parameters", "p.yaml"]
     (excite.folder / "fit.h5").write_text("to be replaced")
-    run = excite.good("identify", folder / CONFIG, folder / "data.h5", *words)
+    shutil.copy(folder / CONFIG, excite.folder)
+    words += ["--held-out", "r1", "--overwrite"]
+    run = excite.good("identify", CONFIG, folder / "data.h5", *words)
     assert "Error of the torque" in run.stdout
     assert "identifiable" in run.stdout
     with h5py.File(excite.folder / "fit.h5") as file:
         assert file.attrs["held_out_run"] == "r1"
-    again = {"robot": {"urdf": str(excite.folder / "new.urdf")}}
-    again["effects"] = yaml.safe_load((excite.folder / "p.yaml").read_text())["effects"]
-    (excite.folder / "again.yaml").write_text(yaml.safe_dump(again))
+    (excite.folder / CONFIG).unlink()
+    for name, made in outputs.items():
+        excite.good("export", "fit.h5", "-f", name, "-o", f"again_{made}")
+        again = excite.folder / f"again_{made}"
+        assert again.read_text() == (excite.folder / made).read_text()
+        assert f"{made} exists" in excite.refused("export", "fit.h5", "-f", name, "-o", made)
+    told = excite.refused("export", "fit.h5", "-f", "csv")
+    assert "fit.h5 is a model: it cannot be exported as csv. Its formats: urdf, mjcf, y" in told
+    tree = {"robot": {"urdf": str(excite.folder / "new.urdf")}}
+    tree["effects"] = yaml.safe_load((excite.folder / "p.yaml").read_text())["effects"]
+    (excite.folder / "again.yaml").write_text(yaml.safe_dump(tree))
     answer = excite.answer("identify", "again.yaml", folder / "data.h5")
     assert len(answer["effects"]) == 2 * robot.n
     mujoco = pytest.importorskip("mujoco")

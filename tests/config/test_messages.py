@@ -1,8 +1,9 @@
 """What a config that is wrong is told: where, what, the nearest word, and what is allowed."""
 
 import re
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_origin
 
 import pytest
 import yaml
@@ -13,7 +14,6 @@ from excite_cli.config import (
     robot_spec,
     spec,
     trajectory_spec,
-    wrench_spec,
 )
 from excite_cli.config.load import MAX_BYTES, load_spec, parse_spec
 from excite_cli.config.section import Section
@@ -22,73 +22,61 @@ from excite_cli.errors import ConfigError
 
 ROBOT = "robot: {urdf: arm.urdf}"
 CAPSULE = "start: [0, 0, 0], end: [0, 0, 1], radius: 0.1"
-
-# path of every section, its class, and the keys that it must have
-LEVELS: dict[str, tuple[type[Section], str]] = {
-    "": (spec.Spec, ""),
-    "robot": (robot_spec.RobotSpec, "urdf: arm.urdf"),
-    "robot.limits.elbow": (robot_spec.JointLimits, ""),
-    "robot.transmissions.0": (
-        robot_spec.TransmissionSpec,
-        "joints: [a], motors: [m], matrix: [[1]]",
-    ),
-    "robot.payload": (robot_spec.PayloadSpec, f"link: hand, {CAPSULE}"),
-    "trajectory": (trajectory_spec.FourierSpec, ""),
-    "sampling": (trajectory_spec.SamplingSpec, ""),
-    "sampling.cost": (trajectory_spec.GridSpec, "samples: 9, step: 0.1"),
-    "sampling.constraints": (trajectory_spec.GridSpec, "samples: 9, step: 0.1"),
-    "criterion": (spec.CriterionSpec, ""),
-    "constraints": (constraints_spec.ConstraintsSpec, ""),
-    "constraints.joint_limits": (constraints_spec.JointLimitsSpec, ""),
-    "constraints.torque": (constraints_spec.TorqueSpec, ""),
-    "constraints.contact": (constraints_spec.ContactSpec, ""),
-    "constraints.surroundings": (constraints_spec.SurroundingsSpec, "floor: 0"),
-    "constraints.surroundings.boxes.table": (
-        constraints_spec.BoxSpec,
-        "size: [1, 1, 1], position: [0, 0, 0]",
-    ),
-    "constraints.surroundings.walls.left": (
-        constraints_spec.WallSpec,
-        "point: [0, 1, 0], normal: [0, -1, 0]",
-    ),
-    "constraints.balance": (constraints_spec.DiscSpec, "kind: disc, radius: 0.1"),
-    "constraints.self_collision": (constraints_spec.SelfCollisionSpec, ""),
-    "constraints.self_collision.capsules.hand": (constraints_spec.CapsuleSpec, CAPSULE),
-    "identified": (spec.IdentifiedSpec, "inertias: {}"),
-    "identified.effects.0": (
-        spec.IdentifiedEffectSpec,
-        "kind: spring, joints: [elbow], values: [1, 0]",
-    ),
-    "uncertainty": (spec.UncertaintySpec, ""),
-    "uncertainty.bodies.elbow": (spec.BodyUncertaintySpec, ""),
-    "optimizer": (spec.OptimizerSpec, ""),
-    "sequence": (spec.SequenceSpec, ""),
-    "sequence.until": (spec.UntilSpec, ""),
-    "effects.0": (data_spec.EffectSpec, "kind: spring"),
-    "measurement": (data_spec.MeasurementSpec, ""),
-    "measurement.filter": (data_spec.FilterSpec, ""),
-    "measurement.wrench.0": (wrench_spec.WrenchSpec, ""),
-    "measurement.base": (wrench_spec.BaseStateSpec, ""),
-    "measurement.base.imu": (wrench_spec.ImuSpec, ""),
-    "identification": (data_spec.IdentificationSpec, ""),
-    "identification.known_payload": (
-        data_spec.KnownPayloadSpec,
-        "runs: [a], mass: 1, center: [0, 0, 0]",
-    ),
-    "identification.total_mass": (data_spec.TotalMassSpec, "mass: 1"),
-    "diagnosis": (data_spec.DiagnosisSpec, ""),
+# What sections must have.
+NEEDED: dict[type[Section], str] = {
+    spec.Spec: ROBOT,
+    robot_spec.RobotSpec: "urdf: arm.urdf",
+    robot_spec.TransmissionSpec: "joints: [a], motors: [m], matrix: [[1]]",
+    robot_spec.PayloadSpec: f"link: hand, {CAPSULE}",
+    trajectory_spec.GridSpec: "samples: 9, step: 0.1",
+    constraints_spec.SurroundingsSpec: "floor: 0",
+    constraints_spec.BoxSpec: "size: [1, 1, 1], position: [0, 0, 0]",
+    constraints_spec.WallSpec: "point: [0, 1, 0], normal: [0, -1, 0]",
+    constraints_spec.DiscSpec: "kind: disc, radius: 0.1",
+    constraints_spec.CapsuleSpec: CAPSULE,
+    spec.IdentifiedSpec: "inertias: {}",
+    spec.IdentifiedEffectSpec: "kind: spring, joints: [elbow], values: [1, 0]",
+    data_spec.EffectSpec: "kind: spring",
+    data_spec.KnownPayloadSpec: "runs: [a], mass: 1, center: [0, 0, 0]",
+    data_spec.TotalMassSpec: "mass: 1",
 }
+# Other kinds of a trajectory and of a support, which are tested by themselves.
+OTHERS = (trajectory_spec.BSplineSpec, constraints_spec.PolygonSpec)
+# The name that a section has within something, and how it is put there.
+WITHIN: dict[Any, tuple[str, Callable[[Any], Any]]] = {
+    dict: (".hand", lambda keys: {"hand": keys}),
+    tuple: (".0", lambda keys: [keys]),
+    None: ("", lambda keys: keys),
+}
+Level = tuple[type[Section], Callable[[dict[str, Any]], dict[str, Any]]]
 
 
-def with_key(path: str, needed: str, key: str) -> str:
-    """A config with the section at `path`, which holds what it needs and `key`."""
-    tree: Any = {**yaml.safe_load(f"{{{needed}}}"), key: 1}
-    for name in reversed(path.split(".") if path else []):
-        tree = [tree] if name == "0" else {name: tree}
-    tree["robot"] = {"urdf": "arm.urdf", **tree.get("robot", {})}
-    if "identified" in tree:
-        tree["identified"]["inertias"] = {}
-    return yaml.safe_dump(tree)
+def inside(annotation: Any, within: Any = None) -> list[tuple[type[Section], Any]]:
+    """Sections that a field may hold, with the mapping or tuple that they are within."""
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        return [(annotation, within)]
+    origin = get_origin(annotation)
+    within = origin if origin in WITHIN and origin else within
+    return [found for inner in get_args(annotation) for found in inside(inner, within)]
+
+
+def levels(kind: type[Section], path: str, around: Callable[..., Any]) -> dict[str, Level]:
+    """Every section below by its path, with what makes a whole config of some keys of it."""
+
+    def whole(keys: dict[str, Any]) -> Any:
+        return around({**yaml.safe_load(f"{{{NEEDED.get(kind, '')}}}"), **keys})
+
+    found = {path: (kind, whole)}
+    for key, field in kind.model_fields.items():
+        for inner, within in inside(field.annotation):
+            if inner not in OTHERS:
+                name, wrap = WITHIN[within]
+                below = lambda keys, key=key, wrap=wrap: whole({key: wrap(keys)})  # noqa: E731
+                found |= levels(inner, f"{path}.{key}{name}".lstrip("."), below)
+    return found
+
+
+LEVELS = levels(spec.Spec, "", lambda keys: keys)
 
 
 def told(text: str, *overrides: str) -> str:
@@ -105,11 +93,11 @@ def told(text: str, *overrides: str) -> str:
 
 @pytest.mark.parametrize("path", LEVELS)
 def test_unknown_key_names_path_nearest_word_and_allowed_keys(path: str) -> None:
-    section, needed = LEVELS[path]
+    section, whole = LEVELS[path]
     keys = sorted(section.model_fields)
     longest = max(keys, key=len)
     wrong = longest[:-2] + longest[-1]  # a letter forgotten
-    message = told(with_key(path, needed, wrong))
+    message = told(yaml.safe_dump(whole({wrong: 1})))
     where = f"{path}.{wrong}" if path else wrong
     assert message.startswith(f"arm.yaml: {where}: unknown key.")
     assert f"Did you mean '{longest}'?" in message
@@ -119,9 +107,7 @@ def test_unknown_key_names_path_nearest_word_and_allowed_keys(path: str) -> None
 
 def test_every_section_is_covered() -> None:
     known = {section for section, _ in LEVELS.values()}
-    defined = set(Section.__subclasses__())
-    tested_below = {trajectory_spec.BSplineSpec, constraints_spec.PolygonSpec}
-    assert defined - known == tested_below
+    assert {*Section.__subclasses__()} - known == {*OTHERS}
 
 
 @pytest.mark.parametrize(

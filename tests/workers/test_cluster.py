@@ -11,7 +11,7 @@ from excite_cli.errors import ConfigError, MissingExtraError, NoAdmissibleMotion
 from excite_cli.workers.base import News
 from excite_cli.workers.cluster import Cluster, ClusterError, Environment, environment
 from tests.api.conftest import SMOKE
-from tests.api.test_on_disk import same
+from tests.api.test_same_answers import same
 from tests.workers import work
 
 distributed = pytest.importorskip("distributed")
