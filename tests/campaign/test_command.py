@@ -3,14 +3,13 @@
 import json
 import subprocess
 from pathlib import Path
-from threading import Thread
 
 import pytest
 
 from excite_cli.campaign.command import Command
 from excite_cli.campaign.measure import NotMeasuredError
 from excite_cli.errors import ConfigError
-from tests.campaign.campaign_process import program, said, start, take_in, until
+from tests.campaign.campaign_process import program, said, take_in, until
 
 _BEGUN = 5.0  # s within which a program has begun, on a machine that is busy, too
 
@@ -84,28 +83,3 @@ def test_lines_that_cannot_be(text: str, told: str) -> None:
     assert told in str(error.value)
     with pytest.raises(ConfigError, match="suffix with its dot"):
         Command.of("a {motion} {data}", "csv")
-
-
-def test_a_program_of_a_killed_campaign_is_waited_for(tmp_path: Path) -> None:
-    """The robot may still move: the lock lasts as long as the program, not as its campaign."""
-    end = tmp_path / "end"
-    body = f"""
-        print("begun", flush=True)
-        while not os.path.exists({str(end)!r}):
-            time.sleep(0.02)
-        open(sys.argv[2], "w").write("whole")
-    """
-    line = program(tmp_path, body)
-    take = take_in(tmp_path)
-    campaign = start(line, tmp_path)
-    until(lambda: "begun" in said(tmp_path, "m.txt"), "the program has begun")
-    campaign.kill()
-    campaign.wait()
-    with pytest.raises(NotMeasuredError, match="still running"):
-        Command.of(line, limit=0.2).wait_for_earlier(take)
-    assert not take.data.exists()
-    waiting = Thread(target=Command.of(line).wait_for_earlier, args=(take,))
-    waiting.start()
-    end.touch()
-    waiting.join()
-    assert take.data.read_text() == "whole"

@@ -86,10 +86,15 @@ def test_a_later_process_of_the_same_id_is_not_taken_for_it(tmp_path: Path) -> N
         other.wait()
 
 
-def test_the_supervisor_of_a_killed_campaign_records_how_the_program_ended(tmp_path: Path) -> None:
-    """Nothing is measured twice."""
-    killed(tmp_path, 1.0, False)
+def test_the_program_of_a_killed_campaign_is_waited_for_and_its_end_recorded(
+    tmp_path: Path,
+) -> None:
+    """The robot may still move: it is locked as long as the program runs, which runs only once."""
+    killed(tmp_path, 3.0, False)
     take = take_in(tmp_path)
+    with pytest.raises(StillRunningError, match="still running"):
+        Command.of("x {motion} {data}", limit=0.2).wait_for_earlier(take)
+    assert not take.data.exists()
     Command.of("x {motion} {data}", limit=PATIENCE).wait_for_earlier(take)
     assert take.data.read_text() == "whole"
     assert is_measured(take.data)

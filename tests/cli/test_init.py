@@ -1,17 +1,13 @@
 """`excite init` as a user runs it: a config that works with no edit, or one sentence."""
 
-import contextlib
-import os
-import pty
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from benchmarks.trust.fuzz_meshes import VALID
 from excite_cli.config.load import load_spec
-from tests.cli.program import BRIEF, Program
+from tests.cli.program import BRIEF, EXCITE, Program, environment
+from tests.cli.terminal import seen_on_a_terminal
 from tests.proposal.robots import GOOD, arm, joint, link, written
 from tests.proposal.test_shapes import FINGERS, shape, with_gripper
 
@@ -59,25 +55,12 @@ def test_what_lies_elsewhere_is_read_only_when_allowed(excite: Program, tmp_path
 
 
 @pytest.mark.parametrize(("answer", "status"), [("y", 0), ("n", 2)])
-def test_a_terminal_is_asked(tmp_path: Path, answer: str, status: int) -> None:
+def test_a_terminal_is_asked(tmp_path: Path, cache: Path, answer: str, status: int) -> None:
     with_a_package(tmp_path)
-    ours, theirs = pty.openpty()
-    process = subprocess.Popen(
-        [sys.executable, "-m", "excite_cli", "init", "--urdf", "urdf/robot.urdf", "-o", "arm.yaml"],
-        cwd=tmp_path,
-        stdin=theirs,
-        stdout=subprocess.DEVNULL,
-        stderr=theirs,
-    )
-    os.close(theirs)
-    os.write(ours, f"{answer}\n".encode())
-    said = b""
-    with contextlib.suppress(OSError):  # the other side is closed
-        while read := os.read(ours, 65536):
-            said += read
-    os.close(ours)
-    assert process.wait() == status
-    assert b"outside its own folder. [y/N]" in said
+    words = [*EXCITE, "init", "--urdf", "urdf/robot.urdf", "-o", "arm.yaml"]
+    ended, said = seen_on_a_terminal(words, 200, tmp_path, environment(cache), f"{answer}\n")
+    assert ended == status, said
+    assert "outside its own folder. [y/N]" in said
     assert (tmp_path / "arm.yaml").exists() is (status == 0)
 
 

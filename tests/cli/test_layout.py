@@ -143,12 +143,12 @@ def _words(text: str) -> set[str]:
 def test_progress_and_messages_fit_on_a_terminal(excite: Program, cache: Path) -> None:
     """What a terminal of 60 columns shows while motions are optimised: no line is cut off."""
     words = [*EXCITE, "optimize", str(SMOKE), "-o", "arm.h5", *BRIEF, "--motions", "1"]
-    shown = seen_on_a_terminal(words, WIDTH, excite.folder, environment(cache))
+    _, shown = seen_on_a_terminal(words, WIDTH, excite.folder, environment(cache))
     assert "motion 1 of 1: condition number" in shown
     assert "motion 1: condition number" in shown
     assert "…" not in shown
     assert max(map(len, shown.splitlines())) <= WIDTH
-    again = seen_on_a_terminal(words, WIDTH, excite.folder, environment(cache))
+    _, again = seen_on_a_terminal(words, WIDTH, excite.folder, environment(cache))
     assert " ".join(again.split()) == (
         "error: arm.h5 exists already. Give another name with -o, go on with --resume, or replace "
         "it with --overwrite."
