@@ -92,6 +92,7 @@ def test_mark_and_session_are_told_from_others(
     assert of_session(sleeper.pid, start - 1) == []  # the id was another process's then
 
 
+@pytest.mark.parametrize("known", [True, False])
 def test_a_signal_is_for_that_process_alone(
     known: bool, sleeper: subprocess.Popen[bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
