@@ -34,16 +34,16 @@ def test_motions_then_fits_then_diagnoses_then_what_follows() -> None:
 
 
 @pytest.mark.parametrize(
-    ("second", "first", "ordered"),
+    ("of_b", "of_a", "ordered"),
     [
         ((), (), ["b.h5", "a.h5"]),  # as given, where nothing else decides
-        ((), ("a.h5",), ["b.h5", "a.h5"]),  # its own prior
-        ((), ("missing.h5",), ["b.h5", "a.h5"]),
+        (("b.h5",), (), ["b.h5", "a.h5"]),  # its own prior
+        (("missing.h5",), (), ["b.h5", "a.h5"]),
         (("a.h5",), ("b.h5",), ["b.h5", "a.h5"]),  # a circle ends
         (("a.h5",), (), ["a.h5", "b.h5"]),
     ],
 )
 def test_what_is_built_upon_comes_first(
-    second: tuple[str, ...], first: tuple[str, ...], ordered: list[str]
+    of_b: tuple[str, ...], of_a: tuple[str, ...], ordered: list[str]
 ) -> None:
-    assert _ordered(("b.h5", motions(*second)), ("a.h5", motions(*first))) == ordered
+    assert _ordered(("b.h5", motions(*of_b)), ("a.h5", motions(*of_a))) == ordered
