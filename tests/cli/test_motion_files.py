@@ -26,6 +26,12 @@ def written(
     return name
 
 
+def test_a_good_file_is_judged(excite: Program) -> None:
+    run = excite.good("check", SMOKE, written(excite.folder, "m.csv"), "--no-meshes")
+    told = " ".join(run.stderr.split())
+    assert "m.csv: its accelerations are those of a spline of degree 5 through the samples" in told
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
