@@ -37,26 +37,18 @@ from excite_cli import (
 )
 from tests.api.conftest import SMOKE
 
+READERS = (read_result, read_fit, read_diagnosis)
+ALONE = (load_problem, *READERS, write_report, propose, verify_gradient)
+OF_A_PROBLEM = (load_data, check, plan_after, simulate, identify, diagnose)
 CALLS: dict[str, Callable[[Problem, Any], object]] = {
-    "load_problem": lambda problem, given: load_problem(given),
-    "read_result": lambda problem, given: read_result(given),
-    "read_fit": lambda problem, given: read_fit(given),
-    "read_diagnosis": lambda problem, given: read_diagnosis(given),
+    **{each.__name__: lambda _, given, each=each: each(given) for each in ALONE},
+    **{each.__name__: each for each in OF_A_PROBLEM},
     "write_result": lambda problem, given: write_result(given, given, problem),
-    "load_data": lambda problem, given: load_data(problem, given),
-    "check": lambda problem, given: check(problem, given),
     "plan": lambda problem, given: plan(problem, priors=given),
-    "plan_after": lambda problem, given: plan_after(problem, given),
-    "simulate": lambda problem, given: simulate(problem, given),
-    "identify": lambda problem, given: identify(problem, given),
-    "diagnose": lambda problem, given: diagnose(problem, given),
     "compare_random": lambda problem, given: compare_random(problem, [given]),  # type: ignore[arg-type]
     "export_file": lambda problem, given: export_file(given, "csv"),
-    "write_report": lambda problem, given: write_report(given),
     "draw_motion": lambda problem, given: draw_motion(given, "x.png"),
     "run_study": lambda problem, given: run_study(given, [], ["seed=1"]),
-    "propose": lambda problem, given: propose(given),
-    "verify_gradient": lambda problem, given: verify_gradient(given),
 }
 LONG = "x" * 5000
 

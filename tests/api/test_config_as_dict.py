@@ -24,7 +24,7 @@ def smoke(**changes: Any) -> dict[str, Any]:
     return {**tree, **changes}
 
 
-def test_a_dict_is_the_same_problem_as_its_file(tmp_path: Path) -> None:
+def test_a_dict_is_the_same_problem_as_its_file_and_is_planned(tmp_path: Path) -> None:
     tree = smoke()
     path = tmp_path / "arm.yaml"
     path.write_text(yaml.safe_dump({**tree, "robot": {**tree["robot"], "urdf": str(URDF)}}))
@@ -34,10 +34,7 @@ def test_a_dict_is_the_same_problem_as_its_file(tmp_path: Path) -> None:
     assert from_file.file == path
     assert tree["robot"]["urdf"] is URDF  # what was given is left alone
     assert load_case(tree).robot.joint_names == from_file.robot.joint_names
-
-
-def test_its_motions_are_stored_and_read(tmp_path: Path) -> None:
-    result = plan(load_problem(smoke()), output=tmp_path / "arm.h5")
+    result = plan(from_dict, output=tmp_path / "arm.h5")
     stored = read_result(tmp_path / "arm.h5")
     np.testing.assert_array_equal(stored.motions[0].coefficients, result.motions[0].coefficients)
 
@@ -74,13 +71,10 @@ def test_what_a_dict_may_not_say(changes: dict[Any, Any], message: str) -> None:
         load_problem({**smoke(), **changes})
 
 
-def test_a_dict_that_holds_itself_is_refused() -> None:
+def test_what_is_neither_file_nor_dict() -> None:
     loop: dict[str, Any] = {}
     loop["robot"] = loop
     with pytest.raises(ConfigError, match="nested too deeply, or holds itself"):
         plain_values(loop, "config")
-
-
-def test_what_is_neither_file_nor_dict() -> None:
     with pytest.raises(ConfigError, match=r"load_problem: config is \['a'\].*text, Path or a dict"):
         load_problem(["a"])  # type: ignore[arg-type]

@@ -33,14 +33,17 @@ def test_motions_then_fits_then_diagnoses_then_what_follows() -> None:
     ) == ["first.h5", "more.h5", "fit.h5", "diagnosis.h5", "next.h5"]
 
 
-def test_the_given_order_is_kept_where_nothing_else_decides() -> None:
-    assert _ordered(("b.h5", motions()), ("a.h5", motions())) == ["b.h5", "a.h5"]
-
-
-@pytest.mark.parametrize("prior", ["a.h5", "missing.h5"])
-def test_a_prior_that_is_not_there_or_itself_holds_nothing_up(prior: str) -> None:
-    assert _ordered(("a.h5", motions(prior)), ("b.h5", motions())) == ["a.h5", "b.h5"]
-
-
-def test_a_circle_ends() -> None:
-    assert _ordered(("a.h5", motions("b.h5")), ("b.h5", motions("a.h5"))) == ["a.h5", "b.h5"]
+@pytest.mark.parametrize(
+    ("of_b", "of_a", "ordered"),
+    [
+        ((), (), ["b.h5", "a.h5"]),  # as given, where nothing else decides
+        (("b.h5",), (), ["b.h5", "a.h5"]),  # its own prior
+        (("missing.h5",), (), ["b.h5", "a.h5"]),
+        (("a.h5",), ("b.h5",), ["b.h5", "a.h5"]),  # a circle ends
+        (("a.h5",), (), ["a.h5", "b.h5"]),
+    ],
+)
+def test_what_is_built_upon_comes_first(
+    of_b: tuple[str, ...], of_a: tuple[str, ...], ordered: list[str]
+) -> None:
+    assert _ordered(("b.h5", motions(*of_b)), ("a.h5", motions(*of_a))) == ordered

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import textwrap
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -47,7 +48,8 @@ def take_in(folder: Path) -> Take:
 
 def program(folder: Path, body: str) -> str:
     """The line for a program of that body; its `sys.argv[1:]` are motion, log and name."""
-    (folder / "play.py").write_text("import sys, time, os, signal, subprocess\n" + body)
+    head = "import sys, time, os, signal, subprocess\n"
+    (folder / "play.py").write_text(head + textwrap.dedent(body))
     return f"'{sys.executable}' '{folder / 'play.py'}' {{motion}} {{data}} {{name}}"
 
 
@@ -61,6 +63,13 @@ def start(
             stderr=said,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
         )
+
+
+def begun(line: str, folder: Path, **given: float) -> tuple[subprocess.Popen[bytes], int]:
+    """The same, and the id that its program says first."""
+    campaign = start(line, folder, **given)
+    until(lambda: "\n" in said(folder, "m.txt"), "the program has started")
+    return campaign, int(said(folder, "m.txt"))
 
 
 def said(folder: Path, by: str = "said.txt") -> str:

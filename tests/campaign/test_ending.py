@@ -26,9 +26,14 @@ def found() -> Diagnosis:
     return replace(diagnosis, trained=good, before=before, after=good, large_rests=())
 
 
-def test_nothing_is_open_where_the_newest_motion_is_predicted(found: Diagnosis) -> None:
+def test_what_is_open(found: Diagnosis) -> None:
     assert still_open(found, ()) == ()
     assert still_open(found, ("a or b",)) == ("a or b: not distinguished yet",)
+    left = replace(found, large_rests=make_diagnosis().large_rests)
+    assert still_open(left, ()) == ("elbow: excess residual of the torque",)
+    useless = replace(found, before=found.after, after=errors(0.011, 0.1, found.joint_names))
+    words = "the effects found do not lower the error on the newest motion"
+    assert words in still_open(useless, ())
 
 
 @pytest.mark.parametrize(
@@ -49,17 +54,6 @@ def test_what_is_missed_on_the_newest_motion(
     assert [text.split(":")[0] for text in left_on_newest(held_out)] == list(joints) * open_
 
 
-def test_structure_that_is_left_is_open(found: Diagnosis) -> None:
-    left = replace(found, large_rests=make_diagnosis().large_rests)
-    assert still_open(left, ()) == ("elbow: excess residual of the torque",)
-
-
-def test_what_does_not_lower_the_error_is_open(found: Diagnosis) -> None:
-    useless = replace(found, before=found.after)
-    worse = replace(useless, after=errors(0.011, 0.1, found.joint_names))
-    assert "the effects found do not lower the error on the newest motion" in still_open(worse, ())
-
-
 @pytest.mark.parametrize(("worse", "open_"), [(0.01, True), (0.001, False)])
 def test_a_name_that_does_harm_is_open(found: Diagnosis, worse: float, open_: bool) -> None:
     named = replace(
@@ -76,18 +70,14 @@ def campaign(
     *rounds: tuple[tuple[str, ...], tuple[str, ...]], known: float = 0.1, **asked: float
 ) -> Campaign:
     """Rounds with (what is open, pairs); each of two motions of 10 s."""
-    made = tuple(
-        Round(
-            number,
-            tuple(
-                PlayedMotion(f"r{number}_m{k}", "excite", "p.h5", k, 1.0, 10.0, "log")
-                for k in (1, 2)
-            ),
-            RoundFindings(0.1, 0.01, ("spring on elbow",), open_, pairs, known),
-        )
-        for number, (open_, pairs) in enumerate(rounds, start=1)
-    )
-    return Campaign("", "", "", Asked(**asked), made)  # type: ignore[arg-type]
+    made = []
+    for number, (open_, pairs) in enumerate(rounds, start=1):
+        motions = [
+            PlayedMotion(f"r{number}_m{k}", "excite", "p.h5", k, 1.0, 10.0, "log") for k in (1, 2)
+        ]
+        findings = RoundFindings(0.1, 0.01, ("spring on elbow",), open_, pairs, known)
+        made.append(Round(number, tuple(motions), findings))
+    return Campaign("", "", "", Asked(**asked), tuple(made))  # type: ignore[arg-type]
 
 
 NOTHING: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
@@ -95,24 +85,38 @@ PAIR = (("a or b: not distinguished yet",), ("a or b",))
 
 
 def test_it_ends_once_a_motion_looked_for_more_and_nothing_is_open() -> None:
-    assert ended(campaign(NOTHING), None).ended == ""
     done = ended(campaign(NOTHING, NOTHING), None)
     assert done.ended == "complete"
     assert "identified without r2_m2" in done.reason
     assert "(spring on elbow)" in done.reason
-    assert ended(campaign(NOTHING, (("x",), ())), None).ended == ""
-    assert ended(campaign(), None).ended == ""
 
 
-def test_it_does_not_end_below_the_motions_own_pace() -> None:
-    assert ended(campaign(NOTHING, NOTHING, from_speed=0.3), None).ended == ""
-    assert ended(campaign(NOTHING, NOTHING, NOTHING, from_speed=0.3), None).ended == "complete"
+OPEN = (("x",), ())
+OTHER = (("c or d: not distinguished yet",), ("c or d",))
 
 
-def test_it_does_not_end_before_the_precision_that_is_asked_for() -> None:
-    rounds = campaign(NOTHING, NOTHING, known=0.2)
-    assert ended(rounds, 0.1).ended == ""
-    assert ended(rounds, 0.2).ended == "complete"
+@pytest.mark.parametrize(
+    ("rounds", "precision", "how"),
+    [
+        (campaign(), None, ""),
+        (campaign(NOTHING), None, ""),
+        (campaign(NOTHING, OPEN), None, ""),
+        # Not below the motions' own pace, nor before the precision that is asked for.
+        (campaign(NOTHING, NOTHING, from_speed=0.3), None, ""),
+        (campaign(NOTHING, NOTHING, NOTHING, from_speed=0.3), None, "complete"),
+        (campaign(NOTHING, NOTHING, known=0.2), 0.1, ""),
+        (campaign(NOTHING, NOTHING, known=0.2), 0.2, "complete"),
+        # Pairs that three rounds do not tell apart, and nothing else.
+        (campaign(PAIR, PAIR), None, ""),
+        (campaign(PAIR, PAIR, OTHER), None, ""),
+        (campaign(PAIR, PAIR, ((*PAIR[0], "x"), PAIR[1])), None, ""),
+        (campaign(PAIR, PAIR, PAIR), None, "stuck"),
+    ],
+)
+def test_when_it_ends(rounds: Campaign, precision: float | None, how: str) -> None:
+    done = ended(rounds, precision)
+    assert done.ended == how
+    assert how != "stuck" or "a or b" in done.reason
 
 
 @pytest.mark.parametrize(
@@ -123,17 +127,6 @@ def test_it_does_not_end_before_the_precision_that_is_asked_for() -> None:
     ],
 )
 def test_a_budget_that_is_spent_says_what_is_open(asked: dict[str, float], told: str) -> None:
-    done = ended(campaign(NOTHING, (("x",), ()), **asked), None)
+    done = ended(campaign(NOTHING, OPEN, **asked), None)
     assert done.ended == "budget"
     assert told in done.reason
-
-
-def test_pairs_that_three_rounds_do_not_tell_apart_end_it() -> None:
-    assert ended(campaign(PAIR, PAIR), None).ended == ""
-    stuck = ended(campaign(PAIR, PAIR, PAIR), None)
-    assert stuck.ended == "stuck"
-    assert "a or b" in stuck.reason
-    other = (("c or d: not distinguished yet",), ("c or d",))
-    assert ended(campaign(PAIR, PAIR, other), None).ended == ""
-    more = ((*PAIR[0], "x"), PAIR[1])
-    assert ended(campaign(PAIR, PAIR, more), None).ended == ""

@@ -14,7 +14,7 @@ from excite_cli.campaign.measured_log import is_measured
 from excite_cli.campaign.one_at_a_time import held_while_it_runs, left_in
 from excite_cli.campaign.processes import running
 from excite_cli.shown.note import Note
-from tests.campaign.campaign_process import PATIENCE, program, said, start, take_in, until
+from tests.campaign.campaign_process import PATIENCE, begun, program, said, start, take_in, until
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
 # Notes who it is, and that it is there; `how` may leave behind all that it was started with.
@@ -28,21 +28,17 @@ open(sys.argv[2], "w").write("whole")
 """
 
 
-def killed(
-    tmp_path: Path, seconds: float, leaves: bool, *also: str
-) -> tuple[subprocess.Popen[bytes], int]:
-    """A campaign that was killed, and its program; `also`: its `supervisor`."""
+def killed(tmp_path: Path, seconds: float, leaves: bool, *also: str) -> int:
+    """The program of a campaign that was killed; `also`: its `supervisor`."""
     line = program(tmp_path, BODY.format(seconds=seconds, leaves=leaves))
-    campaign = start(line, tmp_path, grace=0.5)
-    until(lambda: "\n" in said(tmp_path, "m.txt"), "the program has started")
-    pid = int(said(tmp_path, "m.txt"))
+    campaign, pid = begun(line, tmp_path, grace=0.5)
     supervisor = running()[pid].parent
     campaign.kill()
     campaign.wait()
     if also:
         os.kill(supervisor, signal.SIGKILL)
         until(lambda: supervisor not in running(), "the supervisor is dead")
-    return campaign, pid
+    return pid
 
 
 def end(pid: int) -> None:
@@ -53,7 +49,7 @@ def end(pid: int) -> None:
 @pytest.mark.parametrize("leaves", [False, True], ids=["plain", "leaves its environment"])
 def test_a_program_without_campaign_and_supervisor_is_named(leaves: bool, tmp_path: Path) -> None:
     """It bears a mark; where it has put that off, it is of a session that was noted."""
-    _, pid = killed(tmp_path, 600.0, leaves, "supervisor")
+    pid = killed(tmp_path, 600.0, leaves, "supervisor")
     heard: list[Note] = []
     try:
         until(lambda: [each.pid for each in left_in(tmp_path)] == [pid], "it is found")
@@ -73,7 +69,7 @@ def test_a_program_without_campaign_and_supervisor_is_named(leaves: bool, tmp_pa
 
 
 def test_a_later_process_of_the_same_id_is_not_taken_for_it(tmp_path: Path) -> None:
-    _, pid = killed(tmp_path, 600.0, True, "supervisor")
+    pid = killed(tmp_path, 600.0, True, "supervisor")
     lock = tmp_path / ".moving.lock"
     noted = lock.read_text()
     end(pid)
@@ -90,10 +86,15 @@ def test_a_later_process_of_the_same_id_is_not_taken_for_it(tmp_path: Path) -> N
         other.wait()
 
 
-def test_the_supervisor_of_a_killed_campaign_records_how_the_program_ended(tmp_path: Path) -> None:
-    """Nothing is measured twice."""
-    killed(tmp_path, 1.0, False)
+def test_the_program_of_a_killed_campaign_is_waited_for_and_its_end_recorded(
+    tmp_path: Path,
+) -> None:
+    """The robot may still move: it is locked as long as the program runs, which runs only once."""
+    killed(tmp_path, 3.0, False)
     take = take_in(tmp_path)
+    with pytest.raises(StillRunningError, match="still running"):
+        Command.of("x {motion} {data}", limit=0.2).wait_for_earlier(take)
+    assert not take.data.exists()
     Command.of("x {motion} {data}", limit=PATIENCE).wait_for_earlier(take)
     assert take.data.read_text() == "whole"
     assert is_measured(take.data)
@@ -113,9 +114,7 @@ def test_the_limit_of_time_outlives_the_campaign(tmp_path: Path) -> None:
 def test_a_program_is_ended_without_its_supervisor(tmp_path: Path) -> None:
     """Somebody has killed that; the campaign lives, and ends what it finds."""
     line = program(tmp_path, BODY.format(seconds=600, leaves=True))
-    campaign = start(line, tmp_path, grace=0.5)
-    until(lambda: "\n" in said(tmp_path, "m.txt"), "the program has started")
-    pid = int(said(tmp_path, "m.txt"))
+    campaign, pid = begun(line, tmp_path, grace=0.5)
     os.kill(running()[pid].parent, signal.SIGKILL)
     assert campaign.wait(PATIENCE) == 1
     assert pid not in running()
@@ -124,9 +123,7 @@ def test_a_program_is_ended_without_its_supervisor(tmp_path: Path) -> None:
 
 def test_a_supervisor_that_is_stopped_does_not_keep_a_program_alive(tmp_path: Path) -> None:
     line = program(tmp_path, BODY.format(seconds=600, leaves=False))
-    campaign = start(line, tmp_path, grace=0.5)
-    until(lambda: "\n" in said(tmp_path, "m.txt"), "the program has started")
-    pid = int(said(tmp_path, "m.txt"))
+    campaign, pid = begun(line, tmp_path, grace=0.5)
     supervisor = running()[pid].parent
     os.kill(supervisor, signal.SIGSTOP)
     campaign.send_signal(signal.SIGINT)

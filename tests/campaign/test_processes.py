@@ -1,4 +1,7 @@
-"""What runs of a program: found by parent, mark or session, and never taken for a later one."""
+"""What runs of a program: found by parent, mark or session, and never taken for a later one.
+
+It is ended by SIGTERM once, by SIGKILL after the grace or at the second request.
+"""
 
 import os
 import signal
@@ -10,8 +13,10 @@ from pathlib import Path
 
 import pytest
 
+from excite_cli.campaign import processes
 from excite_cli.campaign.processes import (
     MARK,
+    Escalation,
     Process,
     descendants,
     in_group,
@@ -75,42 +80,36 @@ ctypes.CDLL(None).pthread_exit(None)
         process.wait()
 
 
-def test_the_mark_is_that_of_the_folder(sleeper: subprocess.Popen[bytes], tmp_path: Path) -> None:
+def test_mark_and_session_are_told_from_others(
+    sleeper: subprocess.Popen[bytes], tmp_path: Path
+) -> None:
     until(lambda: ids(marked(tmp_path)) == [sleeper.pid], "it has begun")
     assert marked(tmp_path / "other") == []
     (longer := tmp_path.with_name(tmp_path.name[:-1])).mkdir(exist_ok=True)
     assert marked(longer) == []
-
-
-def test_a_session_is_known_by_its_beginning(sleeper: subprocess.Popen[bytes]) -> None:
     start = start_of(sleeper.pid)
-    until(lambda: ids(of_session(sleeper.pid, start)) == [sleeper.pid], "it has begun")
+    assert ids(of_session(sleeper.pid, start)) == [sleeper.pid]
     assert of_session(sleeper.pid, start - 1) == []  # the id was another process's then
 
 
-def test_a_signal_is_for_that_process_alone(sleeper: subprocess.Popen[bytes]) -> None:
+@pytest.mark.parametrize("known", [True, False])
+def test_a_signal_is_for_that_process_alone(
+    known: bool, sleeper: subprocess.Popen[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where pidfd is not known."""
+
+    def unknown(pid: int) -> int:
+        raise OSError(38, "Function not implemented")
+
     process = running()[sleeper.pid]
+    if not known:
+        monkeypatch.setattr(os, "pidfd_open", unknown)
     send(replace(process, start=process.start - 1), signal.SIGKILL)
     with pytest.raises(subprocess.TimeoutExpired):
         sleeper.wait(0.2)
     send(process, signal.SIGKILL)
     assert sleeper.wait(PATIENCE) == -signal.SIGKILL
     send(process, signal.SIGKILL)  # it is gone
-
-
-def test_where_pidfd_is_not_known_a_signal_is_sent_all_the_same(
-    sleeper: subprocess.Popen[bytes], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def unknown(pid: int) -> int:
-        raise OSError(38, "Function not implemented")
-
-    process = running()[sleeper.pid]
-    monkeypatch.setattr(os, "pidfd_open", unknown)
-    send(replace(process, start=process.start - 1), signal.SIGKILL)
-    with pytest.raises(subprocess.TimeoutExpired):
-        sleeper.wait(0.2)
-    send(process, signal.SIGKILL)
-    assert sleeper.wait(PATIENCE) == -signal.SIGKILL
 
 
 def test_a_group_stands_for_its_processes(sleeper: subprocess.Popen[bytes]) -> None:
@@ -132,3 +131,55 @@ def test_names_of_processes_may_hold_anything(tmp_path: Path) -> None:
     finally:
         process.kill()
         process.wait()
+
+
+INSIDE, OUTSIDE = Process(11, 10, "play", start=1), Process(12, 12, "daemon", start=1)
+
+
+class Bench:
+    """A clock, processes that run, and the signals that were sent."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now, self.running = 0.0, [INSIDE, OUTSIDE]
+        self.sent: list[tuple[int, tuple[int, ...]]] = []
+        monkeypatch.setattr(processes.time, "monotonic", lambda: self.now)
+        monkeypatch.setattr(processes, "send_to_all", self._note)
+        self.ending = Escalation(lambda: self.running, 10, 5.0)
+
+    def _note(self, processes: list[Process], group: int, number: int) -> None:
+        assert group == 10
+        self.sent.append((number, tuple(each.pid for each in processes)))
+
+    def at(self, now: float) -> list[tuple[int, tuple[int, ...]]]:
+        """What is sent in a step then."""
+        self.now, self.sent = now, []
+        self.ending.step()
+        return self.sent
+
+
+@pytest.fixture
+def bench(monkeypatch: pytest.MonkeyPatch) -> Bench:
+    return Bench(monkeypatch)
+
+
+def test_sigterm_once_then_sigkill_after_the_grace_whatever_happens(bench: Bench) -> None:
+    assert bench.at(-100.0) == []  # nothing happens before a request
+    bench.now = 0.0
+    bench.ending.request()
+    assert bench.sent == [(signal.SIGTERM, (11, 12)), (signal.SIGCONT, (11, 12))]
+    assert bench.at(4.9) == []  # a second SIGTERM would break off what the first one began
+    assert bench.at(5.0) == [(signal.SIGKILL, (11, 12))]
+    bench.running = [OUTSIDE, Process(13, 12, "child", start=2)]
+    assert bench.at(5.1) == [(signal.SIGKILL, (12, 13))]  # also what was started since
+    assert not bench.ending.in_vain
+    bench.at(7.1)
+    assert bench.ending.in_vain
+
+
+def test_sigkill_at_once_when_asked_again(bench: Bench) -> None:
+    bench.ending.request()
+    bench.sent = []
+    bench.ending.request()
+    assert bench.sent == [(signal.SIGKILL, (11, 12))]
+    bench.ending.request()  # a third time changes nothing
+    assert bench.ending.stage == 2

@@ -3,6 +3,8 @@
 import os
 import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from threading import Thread
 
@@ -18,15 +20,21 @@ from excite_cli.campaign.supervisor import Ended
 from tests.campaign.campaign_process import program, said, take_in, until
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
-# A supervisor whose SIGKILL does nothing, as with a process that waits for hardware.
-_WITHOUT_FORCE = """
+# A supervisor with something changed, given the path of imports.
+_SERVE = """
 import signal, sys
 sys.path[:] = sys.argv[1:]
 from excite_cli.campaign import processes, supervisor
 send = processes.send_to_all
-processes.send_to_all = lambda *given: None if given[2] == signal.SIGKILL else send(*given)
+{}
 supervisor.serve()
 """
+# SIGKILL does nothing, as with a process that waits for hardware.
+WITHOUT_FORCE = (
+    "processes.send_to_all = lambda *given: None if given[2] == signal.SIGKILL else send(*given)"
+)
+# As where there is no /proc, and no process can adopt another's children.
+WITHOUT_PROC = "supervisor.adopt_orphans = lambda: False"
 DEAF = """
 for each in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
     signal.signal(each, signal.SIG_IGN)
@@ -38,7 +46,7 @@ time.sleep(600)
 def test_a_process_that_no_signal_ends_is_said_first(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    words = [sys.executable, "-P", "-c", _WITHOUT_FORCE, *sys.path]
+    words = [sys.executable, "-P", "-c", _SERVE.format(WITHOUT_FORCE), *sys.path]
     monkeypatch.setattr(supervised, "command", lambda module: words)
     take, line = take_in(tmp_path), program(tmp_path, DEAF)
     measure = Command.of(line, limit=3.0, grace=0.2)
@@ -56,18 +64,8 @@ def test_a_process_that_no_signal_ends_is_said_first(
     until(lambda: not left_in(tmp_path) and pid not in running(), "the supervisor has ended, too")
 
 
-# As where there is no /proc, and no process can adopt another's children.
-_WITHOUT_PROC = """
-import sys
-sys.path[:] = sys.argv[1:]
-from excite_cli.campaign import supervisor
-supervisor.adopt_orphans = lambda: False
-supervisor.serve()
-"""
-
-
 def test_without_proc_the_group_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    words = [sys.executable, "-P", "-c", _WITHOUT_PROC, *sys.path]
+    words = [sys.executable, "-P", "-c", _SERVE.format(WITHOUT_PROC), *sys.path]
     monkeypatch.setattr(supervised, "command", lambda module: words)
     line = program(tmp_path, "if os.fork():\n    time.sleep(600)\n" + DEAF)
     with pytest.raises(NotMeasuredError, match="still running after 3 s"):
@@ -75,32 +73,34 @@ def test_without_proc_the_group_is_ended(tmp_path: Path, monkeypatch: pytest.Mon
     assert int(said(tmp_path, "m.txt")) not in running()
 
 
-def test_it_is_said_before_an_interruption(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(*given: object) -> Ended:
-        os.kill(os.getpid(), signal.SIGINT)
-        return Ended(None, "asked", alive="process 4711 (python)")
-
-    monkeypatch.setattr(command, "followed", interrupted)
-    before = signal.getsignal(signal.SIGINT)
-    with pytest.raises(StillRunningError, match=r"^still running: process 4711 \(python\), "):
-        Command.of("x {motion} {data}").take(take_in(tmp_path))
-    assert signal.getsignal(signal.SIGINT) is before
-
-
-def test_an_interruption_comes_once_the_program_has_ended(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def interrupted(*given: object) -> Ended:
-        os.kill(os.getpid(), signal.SIGINT)
-        return Ended(1)
-
-    monkeypatch.setattr(command, "followed", interrupted)
+@contextmanager
+def interrupts() -> Iterator[None]:
+    """SIGINT as Python has it, however the tests were started."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        with pytest.raises(KeyboardInterrupt):
-            Command.of("x {motion} {data}").take(take_in(tmp_path))
+        yield
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def test_what_still_runs_is_said_before_an_interruption(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """That comes once the program has ended."""
+    ends = iter([Ended(None, "asked", alive="process 4711 (python)"), Ended(1)])
+
+    def interrupted(*given: object) -> Ended:
+        os.kill(os.getpid(), signal.SIGINT)
+        return next(ends)
+
+    monkeypatch.setattr(command, "followed", interrupted)
+    measure, take = Command.of("x {motion} {data}"), take_in(tmp_path)
+    with interrupts():
+        with pytest.raises(StillRunningError, match=r"^still running: process 4711 \(python\), "):
+            measure.take(take)
+        with pytest.raises(KeyboardInterrupt):
+            measure.take(take)
 
 
 def test_a_program_is_run_from_any_thread(tmp_path: Path) -> None:
@@ -150,13 +150,10 @@ time.sleep(600)
         until(lambda: "here" in said(tmp_path, "m.txt"), "the program has started")
         os.kill(os.getpid(), signal.SIGINT)
 
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    terminal = Thread(target=close)
-    terminal.start()
-    try:
+    measure, terminal = Command.of(program(tmp_path, body), tell=fail), Thread(target=close)
+    with interrupts():
+        terminal.start()
         with pytest.raises(KeyboardInterrupt):
-            Command.of(program(tmp_path, body), tell=fail).take(take_in(tmp_path))
-    finally:
-        signal.signal(signal.SIGINT, before)
-        terminal.join()
+            measure.take(take_in(tmp_path))
+    terminal.join()
     assert "stopped the robot" in said(tmp_path, "m.txt")

@@ -31,6 +31,15 @@ def two_motions(tmp_path_factory: pytest.TempPathFactory, cache: Path) -> Run:
     """Two brief motions of the smoke arm, with `--json`, into a folder that is not there yet."""
     folder = tmp_path_factory.mktemp("two_motions")
     path = folder / "new" / "folder" / "arm.h5"
-    run = Program(folder, cache)("optimize", SMOKE, "-o", path, *BRIEF, "--json")
-    assert run.returncode == 0, run.stderr
-    return Run(run, path)
+    return Run(Program(folder, cache).good("optimize", SMOKE, "-o", path, *BRIEF, "--json"), path)
+
+
+@pytest.fixture(scope="session")
+def two_joints(tmp_path_factory: pytest.TempPathFactory, cache: Path) -> Path:
+    """Two motions of two joints, which are drawn soon."""
+    path = tmp_path_factory.mktemp("two_joints") / "smoke.h5"
+    small = ("robot.joints=[elbow, slide]", "constraints.self_collision=null")
+    options = [word for value in small for word in ("--set", value)]
+    program = Program(path.parent, cache)
+    program.good("optimize", SMOKE, "-o", path, "--motions", "2", *BRIEF, *options)
+    return path

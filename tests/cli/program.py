@@ -56,9 +56,24 @@ class Program:
 
     def answer(self, *arguments: str | Path) -> Any:
         """What `--json` prints, after a run that succeeded."""
-        run = self(*arguments, "--json")
+        return json.loads(self.good(*arguments, "--json").stdout)
+
+    def good(self, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
+        """A run that must succeed."""
+        run = self(*arguments)
         assert run.returncode == 0, run.stderr
-        return json.loads(run.stdout)
+        return run
+
+    def refused(self, *arguments: str | Path, status: int = 2) -> str:
+        """The one message of a run that must fail, as one line; nothing else may be answered."""
+        run = self(*arguments)
+        assert run.returncode == status, run.stdout + run.stderr
+        assert run.stdout == ""
+        assert not run.stderr.startswith("Usage:")
+        assert "Traceback" not in run.stderr
+        assert "\x1b" not in run.stderr
+        assert sum(line.startswith("error: ") for line in run.stderr.splitlines()) == 1, run.stderr
+        return " ".join(run.stderr.split())
 
 
 class Installed(Program):

@@ -1,5 +1,6 @@
 """The installed program on a terminal of its own, some columns wide."""
 
+import contextlib
 import fcntl
 import os
 import pty
@@ -13,9 +14,9 @@ _ESCAPES = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 
 
 def seen_on_a_terminal(
-    words: list[str], columns: int, folder: Path, variables: dict[str, str]
-) -> str:
-    """All that was printed, lines that were replaced included, without what steers a terminal."""
+    words: list[str], columns: int, folder: Path, variables: dict[str, str], typed: str = ""
+) -> tuple[int, str]:
+    """The exit status, and all that was printed, replaced lines included, but what steers."""
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 40, columns, 0, 0))
     kept = {name: value for name, value in variables.items() if name != "COLUMNS"}
@@ -23,22 +24,19 @@ def seen_on_a_terminal(
         words,
         cwd=folder,
         env={**kept, "TERM": "xterm"},
-        stdin=subprocess.DEVNULL,
+        stdin=theirs if typed else subprocess.DEVNULL,
         stdout=theirs,
         stderr=theirs,
     )
     os.close(theirs)
+    os.write(ours, typed.encode())
     text = b""
-    while True:
-        try:
-            read = os.read(ours, 65536)
-        except OSError:  # the other side is closed
-            break
-        if not read:
-            break
-        text += read
+    with contextlib.suppress(OSError):  # the other side is closed
+        while read := os.read(ours, 65536):
+            text += read
     os.close(ours)
-    process.wait(60)
+    status = process.wait(60)
     # Where a line begins anew, the terminal's cursor moves; all of them are kept here.
     moved = re.sub(r"\x1b\[[0-9]*[AGK]", "\n", text.decode(errors="replace"))
-    return "\n".join(line for line in re.split(r"[\r\n]+", _ESCAPES.sub("", moved)) if line.strip())
+    lines = re.split(r"[\r\n]+", _ESCAPES.sub("", moved))
+    return status, "\n".join(line for line in lines if line.strip())

@@ -13,7 +13,6 @@ def test_random_beside_optimised(excite: Program, two_motions: Run) -> None:
         "compare-random", SMOKE, *BRIEF, "--candidates", "4", "--optimized", two_motions.path,
         "-o", "both.h5",
     )  # fmt: skip
-    assert set(answer) >= {"random", "optimized", "candidates", "admissible"}
     assert answer["candidates"] >= 4
     assert 0 < answer["admissible"] <= answer["candidates"]
     stored = read_result(two_motions.path)
@@ -22,8 +21,7 @@ def test_random_beside_optimised(excite: Program, two_motions: Run) -> None:
     ]
     random = answer["random"]
     assert [m["index"] for m in random] == [1, 2]
-    for motion in random:
-        assert set(motion) >= {"index", "condition_number", "stacked_condition_number"}
+    assert [path.name for path in excite.folder.iterdir()] == ["both.h5"]  # no claim is left
     both = read_result(excite.folder / "both.h5")
     objective = build_problem(load_spec(SMOKE, ["constraints={}"]), SMOKE.parent).objective()
     blocks = [objective.block(motion.coefficients) for motion in both.random]

@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,7 +26,7 @@ from excite_cli.trajectory.fourier import FourierTrajectory
 from tests.cli.program import ROOT, SMOKE, Program
 
 NAMES = ("shoulder_yaw", "shoulder_pitch", "elbow", "wrist_roll", "slide")
-Damage = Callable[[Run], Run]
+Change = Callable[[Any], Any]
 
 
 @pytest.fixture(scope="module")
@@ -59,67 +60,62 @@ def recorded(robot: Robot) -> Dataset:
     return simulate(robot, motions, settings, [friction]).dataset
 
 
-def damaged(recorded: Dataset, damage: Damage) -> Dataset:
-    return replace(recorded, runs=tuple(damage(replace(r, extra={})) for r in recorded.runs))
+def damaged(recorded: Dataset, changes: dict[str, Change]) -> Dataset:
+    """With the named channels of every run changed."""
+
+    def of(run: Run) -> Run:
+        made = {name: change(getattr(run, name)) for name, change in changes.items()}
+        return replace(run, extra={}, **made)
+
+    return replace(recorded, runs=tuple(map(of, recorded.runs)))
 
 
-def flipped(joint: int, *channels: str) -> Damage:
-    def damage(run: Run) -> Run:
-        sign = np.where(np.arange(run.q.shape[1]) == joint, -1.0, 1.0)
-        return replace(run, **{name: getattr(run, name) * sign for name in channels})
-
-    return damage
+def times(*factors: float) -> Change:
+    return lambda values: values * np.array(factors)
 
 
-def torques_in_order(*order: int) -> Damage:
-    return lambda run: replace(run, tau=run.tau[:, list(order)])
+def flipped(joint: int) -> Change:
+    return times(*(-1.0 if j == joint else 1.0 for j in range(5)))
 
 
-def with_joint(channel: str, joint: int, value: float) -> Damage:
-    def damage(run: Run) -> Run:
-        column = getattr(run, channel).copy()
-        column[:, joint] = value
-        return replace(run, **{channel: column})
-
-    return damage
+def joints_in_order(*order: int) -> Change:
+    return lambda values: values[:, list(order)]
 
 
-def in_degrees(run: Run) -> Run:
-    turn = np.array([180 / np.pi] * 4 + [1.0])
-    return replace(run, q=run.q * turn, dq=None)
+def constant(joint: int, value: float) -> Change:
+    return lambda values: np.where(np.arange(5) == joint, value, values)
 
 
-CASES: dict[str, tuple[Damage, tuple[str, ...]]] = {
-    "milliseconds": (lambda run: replace(run, t=run.t * 1e3), ("measurement.time: ms",)),
-    "milliseconds, no speeds": (
-        lambda run: replace(run, t=run.t * 1e3, dq=None),
-        ("measurement.time: ms",),
-    ),
-    "degrees, no speeds": (in_degrees, ("measurement.angle: deg",)),
-    "degrees": (
-        lambda run: replace(run, q=in_degrees(run).q),
-        ("positions are in degrees", "measurement.angle: deg"),
-    ),
-    "dead torque": (with_joint("tau", 2, 0.0), ("torque of elbow is constant at 0",)),
-    "constant torque": (with_joint("tau", 1, 3.5), ("torque of shoulder_pitch is constant",)),
-    "dead position": (with_joint("q", 2, 0.4), ("position of elbow is constant",)),
-    "speed of other sign": (flipped(2, "dq"), ("recorded speed of elbow", "velocity_sign")),
+NO_SPEEDS: dict[str, Change] = {"dq": lambda values: None}
+MILLISECONDS, DEGREES = {"t": times(1e3)}, {"q": times(*[180 / np.pi] * 4, 1.0)}
+CASES: dict[str, tuple[dict[str, Change], tuple[str, ...]]] = {
+    "milliseconds": (MILLISECONDS, ("measurement.time: ms",)),
+    "milliseconds, no speeds": (MILLISECONDS | NO_SPEEDS, ("measurement.time: ms",)),
+    "degrees, no speeds": (DEGREES | NO_SPEEDS, ("measurement.angle: deg",)),
+    "degrees": (DEGREES, ("positions are in degrees", "measurement.angle: deg")),
+    "dead torque": ({"tau": constant(2, 0.0)}, ("torque of elbow is constant at 0",)),
+    "constant torque": ({"tau": constant(1, 3.5)}, ("torque of shoulder_pitch is constant",)),
+    "dead position": ({"q": constant(2, 0.4)}, ("position of elbow is constant",)),
+    "speed of other sign": ({"dq": flipped(2)}, ("recorded speed of elbow", "velocity_sign")),
     "swapped torques": (
-        torques_in_order(0, 2, 1, 3, 4),
+        {"tau": joints_in_order(0, 2, 1, 3, 4)},
         ("torques of shoulder_pitch and elbow are swapped",),
     ),
-    "reversed torques": (torques_in_order(4, 3, 2, 1, 0), ("torques are in another order",)),
+    "reversed torques": (
+        {"tau": joints_in_order(4, 3, 2, 1, 0)},
+        ("torques are in another order",),
+    ),
     "all torque signs": (
-        lambda run: replace(run, tau=-run.tau),
+        {"tau": times(-1.0)},
         ("torque of every joint has the opposite sign", "measurement.sign"),
     ),
     "position sign": (
-        flipped(2, "q", "dq"),
+        {"q": flipped(2), "dq": flipped(2)},
         ("position of elbow has the opposite sign", "measurement.position_sign: {elbow: -1}"),
     ),
     **{
         f"torque sign of {name}": (
-            flipped(j, "tau"),
+            {"tau": flipped(j)},
             (f"torque of {name} has the opposite sign", f"measurement.sign: {{{name}: -1}}"),
         )
         for j, name in enumerate(NAMES)
@@ -127,22 +123,14 @@ CASES: dict[str, tuple[Damage, tuple[str, ...]]] = {
 }
 
 
-def one_clear_message(program: Program, words: tuple[str, ...], *arguments: str | Path) -> None:
-    run = program(*arguments)
-    assert run.returncode == 2, run.stdout + run.stderr
-    assert "Traceback" not in run.stderr
-    text = " ".join(run.stderr.split())
-    assert all(word in text for word in words), text
-    assert run.stdout.strip() == ""
-
-
 @pytest.mark.parametrize("case", ["milliseconds", "dead torque", "torque sign of elbow"])
 def test_the_program_ends_with_the_message(
     case: str, recorded: Dataset, config: Path, excite: Program
 ) -> None:
-    damage, words = CASES[case]
-    write_dataset(excite.folder / "data.h5", damaged(recorded, damage), {})
-    one_clear_message(excite, words, "diagnose", config, "data.h5")
+    changes, words = CASES[case]
+    write_dataset(excite.folder / "data.h5", damaged(recorded, changes), {})
+    told = excite.refused("diagnose", config, "data.h5")
+    assert all(word in told for word in words), told
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -150,8 +138,8 @@ def test_every_mistake_has_its_message(
     case: str, recorded: Dataset, config: Path, robot: Robot, tmp_path: Path
 ) -> None:
     """The way `diagnose` and `identify` take from the file, without a process for each case."""
-    damage, words = CASES[case]
-    write_dataset(tmp_path / "data.h5", damaged(recorded, damage), {})
+    changes, words = CASES[case]
+    write_dataset(tmp_path / "data.h5", damaged(recorded, changes), {})
     spec = load_spec(config)
     with pytest.raises(FileError) as told:  # noqa: PT012 - either may be the one that tells
         data = load_data(Case(spec, config.parent, robot), tmp_path / "data.h5")
@@ -168,8 +156,7 @@ def test_names_in_another_order_are_told_by_diagnose_and_identify(
     write_dataset(excite.folder / "data.h5", replace(recorded, joint_names=names), {})
     write_csv(excite.folder / "data.csv", recorded.runs[0], names)
     for command, file in (("diagnose", "data.csv"), ("identify", "data.h5")):
-        run = excite(command, config, file)
-        said = " ".join(run.stderr.split())
+        said = excite.refused(command, config, file)
         assert "columns of shoulder_pitch and elbow are swapped" in said
         assert "measurement.names: {" in said
         assert "measurement.trust: [order of columns]" in said
@@ -193,8 +180,7 @@ def test_a_gap_and_missing_values_are_warned_of_and_the_diagnosis_is_right(
     gap = (second.t < 2.0) | (second.t > 2.3)
     write_csv(excite.folder / "nan.csv", replace(first, tau=broken), recorded.joint_names)
     write_csv(excite.folder / "gap.csv", second, recorded.joint_names, gap)
-    run = excite("diagnose", config, "nan.csv", "gap.csv", "--json")
-    assert run.returncode == 0, run.stderr
+    run = excite.good("diagnose", config, "nan.csv", "gap.csv", "--json")
     said = " ".join(run.stderr.split())
     assert "warning (gap" in said
     assert "warning (nan" in said
@@ -213,7 +199,7 @@ def test_a_bag_cut_short(excite: Program, config: Path) -> None:
     data = next(bag.glob("*.db3"))
     cut = excite.folder / "cut.db3"
     cut.write_bytes(data.read_bytes()[: data.stat().st_size // 2])
-    one_clear_message(excite, ("cut.db3",), "diagnose", config, "cut.db3")
+    assert "cut.db3" in excite.refused("diagnose", config, "cut.db3")
 
 
 def test_a_real_bag_cut_short(excite: Program) -> None:
@@ -222,4 +208,4 @@ def test_a_real_bag_cut_short(excite: Program) -> None:
     (excite.folder / "cut.db3").write_bytes(whole[: len(whole) // 2])
     problem = {"robot": {"urdf": str(folder / "ur10.urdf")}}
     (excite.folder / "ur10.yaml").write_text(yaml.safe_dump(problem))
-    one_clear_message(excite, ("cut.db3",), "diagnose", "ur10.yaml", "cut.db3")
+    assert "cut.db3" in excite.refused("diagnose", "ur10.yaml", "cut.db3")

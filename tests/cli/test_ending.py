@@ -9,13 +9,20 @@ from excite_cli.cli.ending import BUG, run_guarded
 from tests.cli.conftest import Run
 from tests.cli.program import SMOKE, Program
 
+NO_MOTION = "--motions 1 --set constraints.joint_limits.acceleration=1e-9"
+
+
+def fail() -> None:
+    raise ZeroDivisionError("by nothing")
+
+
+def stop() -> None:
+    raise KeyboardInterrupt
+
 
 def test_a_bug_says_how_to_report_it(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail() -> None:
-        raise ZeroDivisionError("by nothing")
-
     monkeypatch.setattr(sys, "argv", ["excite", "optimize"])
     assert run_guarded(fail) == BUG
     told = capsys.readouterr().err
@@ -47,12 +54,7 @@ def test_a_refusal_of_the_file_system_is_no_bug(capsys: pytest.CaptureFixture[st
         ("robots none", "RobotError", 2, "neither a robot nor a file 'none'"),
         ("check CONFIG none.h5", "FileError", 2, "There is no file none.h5."),
         ("identify CONFIG RESULT", "FileError", 2, "holds planned motions, not measured data."),
-        (
-            "optimize CONFIG -o x.h5 --motions 1 --set constraints.joint_limits.acceleration=1e-9",
-            "NoAdmissibleMotionError",
-            1,
-            "No motion",
-        ),
+        (f"optimize CONFIG -o x.h5 {NO_MOTION}", "NoAdmissibleMotionError", 1, "No motion"),
     ],
 )
 def test_errors_are_json_where_answers_are(
@@ -74,17 +76,9 @@ def test_errors_are_json_where_answers_are(
 def test_a_bug_and_an_interruption_are_json_too(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail() -> None:
-        raise ZeroDivisionError("by nothing")
-
-    def stop() -> None:
-        raise KeyboardInterrupt
-
     monkeypatch.setattr(sys, "argv", ["excite", "optimize", "--json"])
-    for action, kind, status in (
-        (fail, "ZeroDivisionError", BUG),
-        (stop, "KeyboardInterrupt", 130),
-    ):
+    cases = ((fail, "ZeroDivisionError", BUG), (stop, "KeyboardInterrupt", 130))
+    for action, kind, status in cases:
         assert run_guarded(action) == status
         out, err = capsys.readouterr()
         assert out == ""

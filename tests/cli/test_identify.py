@@ -1,5 +1,6 @@
 """`excite identify` as a user runs it."""
 
+import shutil
 from pathlib import Path
 
 import h5py
@@ -27,14 +28,10 @@ def robot() -> Robot:
 def folder(robot: Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A problem that declares friction, and three measured runs."""
     folder = tmp_path_factory.mktemp("identify")
-    robot_part = yaml.safe_load(SMOKE.read_text())["robot"]
-    if not robot_part["urdf"].startswith("example-robot-data:"):
-        robot_part["urdf"] = str((SMOKE.parent / robot_part["urdf"]).resolve())
-    problem = {
-        "robot": robot_part,
-        "effects": [{"kind": "viscous_friction"}, {"kind": "coulomb_friction"}],
-    }
-    (folder / CONFIG).write_text(yaml.safe_dump(problem))
+    tree = yaml.safe_load(SMOKE.read_text())["robot"]
+    tree["urdf"] = str((SMOKE.parent / tree["urdf"]).resolve())
+    kinds = [{"kind": "viscous_friction"}, {"kind": "coulomb_friction"}]
+    (folder / CONFIG).write_text(yaml.safe_dump({"robot": tree, "effects": kinds}))
     effects = declared_effects(load_spec(folder / CONFIG).effects, robot)
     values = np.linspace(0.5, 2.0, 2 * robot.n)
     phi = true_inertias(robot, 0.2, seed=3)
@@ -59,20 +56,30 @@ def test_json_holds_what_scripts_rely_on(folder: Path, robot: Robot, excite: Pro
     assert 0 < error["mean_relative"] < 0.2
 
 
-def test_every_output_is_written_and_can_be_used(
+def test_every_output_is_written_can_be_used_and_exported_again(
     folder: Path, robot: Robot, excite: Program
 ) -> None:
-    outputs = {"-o": "fit.h5", "--urdf": "new.urdf", "--mjcf": "new.xml", "--parameters": "p.yaml"}
-    words = [word for pair in outputs.items() for word in pair]
-    run = excite("identify", folder / CONFIG, folder / "data.h5", *words, "--held-out", "r1")
-    assert run.returncode == 0, run.stderr
+    outputs = {"urdf": "new.urdf", "mjcf": "new.xml", "yaml": "p.yaml"}
+    words = ["-o", "fit.h5", "--urdf", "new.urdf", "--mjcf", "new.xml", "--parameters", "p.yaml"]
+    (excite.folder / "fit.h5").write_text("to be replaced")
+    shutil.copy(folder / CONFIG, excite.folder)
+    words += ["--held-out", "r1", "--overwrite"]
+    run = excite.good("identify", CONFIG, folder / "data.h5", *words)
     assert "Error of the torque" in run.stdout
     assert "identifiable" in run.stdout
     with h5py.File(excite.folder / "fit.h5") as file:
         assert file.attrs["held_out_run"] == "r1"
-    again = {"robot": {"urdf": str(excite.folder / "new.urdf")}}
-    again["effects"] = yaml.safe_load((excite.folder / "p.yaml").read_text())["effects"]
-    (excite.folder / "again.yaml").write_text(yaml.safe_dump(again))
+    (excite.folder / CONFIG).unlink()
+    for name, made in outputs.items():
+        excite.good("export", "fit.h5", "-f", name, "-o", f"again_{made}")
+        again = excite.folder / f"again_{made}"
+        assert again.read_text() == (excite.folder / made).read_text()
+        assert f"{made} exists" in excite.refused("export", "fit.h5", "-f", name, "-o", made)
+    told = excite.refused("export", "fit.h5", "-f", "csv")
+    assert "fit.h5 is a model: it cannot be exported as csv. Its formats: urdf, mjcf, y" in told
+    tree = {"robot": {"urdf": str(excite.folder / "new.urdf")}}
+    tree["effects"] = yaml.safe_load((excite.folder / "p.yaml").read_text())["effects"]
+    (excite.folder / "again.yaml").write_text(yaml.safe_dump(tree))
     answer = excite.answer("identify", "again.yaml", folder / "data.h5")
     assert len(answer["effects"]) == 2 * robot.n
     mujoco = pytest.importorskip("mujoco")
@@ -80,27 +87,17 @@ def test_every_output_is_written_and_can_be_used(
     assert (model.dof_damping > 0).all()
 
 
-def test_files_are_not_replaced_unless_said(folder: Path, excite: Program) -> None:
-    kept = excite.folder / "fit.h5"
-    kept.write_text("mine")
-    run = excite("identify", folder / CONFIG, folder / "data.h5", "-o", kept)
-    assert run.returncode == 2
-    assert "--overwrite" in run.stderr
-    assert kept.read_text() == "mine"
-    run = excite("identify", folder / CONFIG, folder / "data.h5", "-o", kept, "--overwrite")
-    assert run.returncode == 0, run.stderr
-    assert h5py.is_hdf5(kept)
-
-
-def test_bad_input_gives_one_message(folder: Path, excite: Program) -> None:
-    cases = {
-        (folder / "data.h5", "--held-out", "r7"): "there is no run 'r7'",
-        (folder / "data.h5", "-o", "x.h5", "--urdf", "x.h5"): "both name x.h5",
-    }
-    for words, message in cases.items():
-        run = excite("identify", folder / CONFIG, *words)
-        assert run.returncode == 2, run.stderr
-        assert message in run.stderr
-        assert "Traceback" not in run.stderr
-        assert sum(line.startswith("error: ") for line in run.stderr.splitlines()) == 1
-    assert list(excite.folder.iterdir()) == []
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--held-out", "r7"), "there is no run 'r7'"),
+        (("-o", "there"), "there exists already. Give another name, or replace it with"),
+        (("-o", "x.h5", "--urdf", "x.h5"), "both name x.h5"),
+    ],
+)
+def test_bad_input_gives_one_message(
+    folder: Path, excite: Program, words: tuple[str, ...], message: str
+) -> None:
+    (excite.folder / "there").write_text("mine")
+    assert message in excite.refused("identify", folder / CONFIG, folder / "data.h5", *words)
+    assert [path.read_text() for path in excite.folder.iterdir()] == ["mine"]

@@ -42,13 +42,10 @@ FIGURES = Table(
 )
 
 
-def test_with_room_every_row_is_a_line() -> None:
+def test_with_room_every_row_is_a_line_then_words_wrap_first() -> None:
     (lines,) = parts_of(FIGURES, 80)
     assert len(lines) == 4
     assert lines[2].split() == [word for cell in FIGURES.rows[0] for word in cell.split()]
-
-
-def test_words_wrap_first() -> None:
     (lines,) = parts_of(FIGURES, 73)
     assert max(map(len, lines)) <= 73
     assert len(lines) > 4
@@ -69,7 +66,7 @@ def test_a_table_becomes_parts_that_name_their_rows(width: int) -> None:
 
 def test_two_columns_name_rows_where_one_does_not() -> None:
     rows = tuple(("spring", f"joint_{n}", *["1234567890"] * 4) for n in range(3))
-    table = Table("", ("effect", "where", "a", "b", "c", "d"), rows, left=("effect", "where"))
+    table = Table("", ("effect", "where", *"abcd"), rows, left=("effect", "where"))
     parts = parts_of(table, 45)
     assert len(parts) == 2
     assert all("joint_2" in lines[-1] for lines in parts)
@@ -115,21 +112,23 @@ def test_pages_of_help_fit(command: str, excite: Program, cache: Path) -> None:
     # A word of an example that is longer than the terminal stays whole.
     long = [line for line in run.stdout.splitlines() if len(line) > WIDTH]
     assert [line for line in long if len(line.split()[-1]) < WIDTH - 20] == []
-    wide = call([command, "--help"], excite.folder, environment(cache), 30.0).stdout
-    assert set(wide.split()) <= set(run.stdout.split())
+    assert set(excite(command, "--help").stdout.split()) <= set(run.stdout.split())
 
 
-@pytest.mark.parametrize("command", ["robots", "robots URDF", "verify-gradient", "check"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("robots",),
+        ("robots", SMOKE.parents[1] / "data" / "smoke_arm.urdf"),
+        ("verify-gradient", SMOKE),
+        ("check", SMOKE, "ARM", "--no-meshes", "--rate", "20"),
+    ],
+)
 def test_answers_of_commands_keep_all_their_words(
-    command: str, excite: Program, two_motions: Run, cache: Path
+    command: tuple[object, ...], excite: Program, two_motions: Run, cache: Path
 ) -> None:
-    words = {
-        "robots": ["robots"],
-        "robots URDF": ["robots", str(SMOKE.parents[1] / "data" / "smoke_arm.urdf")],
-        "verify-gradient": ["verify-gradient", str(SMOKE)],
-        "check": ["check", str(SMOKE), str(two_motions.path), "--no-meshes", "--rate", "20"],
-    }[command]
-    wide = call(words, excite.folder, environment(cache), 120.0)
+    words = [str(two_motions.path) if word == "ARM" else str(word) for word in command]
+    wide = excite.good(*words)
     narrow = call(words, excite.folder, {**environment(cache), "COLUMNS": str(WIDTH)}, 120.0)
     assert narrow.returncode == 0, narrow.stderr
     assert max(map(len, narrow.stdout.splitlines())) <= WIDTH
@@ -144,12 +143,12 @@ def _words(text: str) -> set[str]:
 def test_progress_and_messages_fit_on_a_terminal(excite: Program, cache: Path) -> None:
     """What a terminal of 60 columns shows while motions are optimised: no line is cut off."""
     words = [*EXCITE, "optimize", str(SMOKE), "-o", "arm.h5", *BRIEF, "--motions", "1"]
-    shown = seen_on_a_terminal(words, WIDTH, excite.folder, environment(cache))
+    _, shown = seen_on_a_terminal(words, WIDTH, excite.folder, environment(cache))
     assert "motion 1 of 1: condition number" in shown
     assert "motion 1: condition number" in shown
     assert "…" not in shown
     assert max(map(len, shown.splitlines())) <= WIDTH
-    again = seen_on_a_terminal(words, WIDTH, excite.folder, environment(cache))
+    _, again = seen_on_a_terminal(words, WIDTH, excite.folder, environment(cache))
     assert " ".join(again.split()) == (
         "error: arm.h5 exists already. Give another name with -o, go on with --resume, or replace "
         "it with --overwrite."

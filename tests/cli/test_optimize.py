@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from excite_cli.store.result_file import read_result
+from tests.api.test_same_answers import same
 from tests.cli.conftest import Run
 from tests.cli.program import BRIEF, SMOKE, Program
 
@@ -12,23 +13,15 @@ KEYS = {"index", "condition_number", "stacked_condition_number", "status", "seco
         "evaluations"}  # fmt: skip
 
 
-def test_json_is_all_of_stdout_and_has_the_keys_of_the_contract(two_motions: Run) -> None:
+def test_json_is_all_of_stdout_and_what_the_file_says(two_motions: Run) -> None:
     answer = json.loads(two_motions.process.stdout)  # fails on any word beside it
     assert two_motions.process.stdout.count("\n") == 1
     assert answer["output"] == str(two_motions.path)
     assert [motion["index"] for motion in answer["motions"]] == [1, 2]
-    for motion in answer["motions"]:
-        assert set(motion) >= KEYS
-        assert motion["iterations"] > 0
-        assert motion["evaluations"] > 0
-        assert all(worst["margin"] >= 0 for worst in motion["margins"].values())
-
-
-def test_json_is_what_the_file_says(two_motions: Run) -> None:
-    answer = json.loads(two_motions.process.stdout)
     for told, stored in zip(answer["motions"], read_result(two_motions.path).motions, strict=True):
-        for key in KEYS:
-            assert told[key] == getattr(stored, key)
+        assert {key: told[key] for key in KEYS} == {key: getattr(stored, key) for key in KEYS}
+        assert min(told["iterations"], told["evaluations"]) > 0
+        assert all(worst["margin"] >= 0 for worst in told["margins"].values())
 
 
 def test_the_second_motion_lowers_the_condition_number_of_the_stack(two_motions: Run) -> None:
@@ -36,21 +29,16 @@ def test_the_second_motion_lowers_the_condition_number_of_the_stack(two_motions:
     assert first.condition_number == pytest.approx(first.stacked_condition_number, rel=1e-9)
     assert second.stacked_condition_number < first.stacked_condition_number
     assert second.stacked_condition_number < second.condition_number
-
-
-def test_people_are_told_on_stderr_what_was_understood(two_motions: Run) -> None:
-    told = two_motions.process.stderr
-    assert "smoke_arm: 5 joints" in told
-    assert "self_collision" in told
-    assert "motion 2: condition number" in told
+    told = two_motions.process.stderr  # for people
+    assert all(each in told for each in ("smoke_arm: 5 joints", "self_collision", "motion 2: cond"))
     assert len(told.splitlines()) == 4  # what was understood in two lines, then the motions
 
 
 def test_quiet_gives_the_answer_only_and_seed_and_set_count(
     excite: Program, two_motions: Run
 ) -> None:
-    run = excite("optimize", SMOKE, *BRIEF, "--motions", "1", "--seed", "9", "--quiet")
-    assert (run.returncode, run.stderr) == (0, "")
+    run = excite.good("optimize", SMOKE, *BRIEF, "--motions", "1", "--seed", "9", "--quiet")
+    assert run.stderr == ""
     assert "Condition numbers" in run.stdout
     result = read_result(excite.folder / "smoke.h5")  # named after the config
     assert result.seed == 9
@@ -63,29 +51,23 @@ def test_quiet_gives_the_answer_only_and_seed_and_set_count(
 def test_an_existing_file_is_refused_and_left_alone(excite: Program, two_motions: Run) -> None:
     path = excite.folder / "arm.h5"
     path.write_bytes(two_motions.path.read_bytes())
-    run = excite("optimize", SMOKE, "-o", path, *BRIEF)
-    assert run.returncode == 2
-    assert f"{path} exists already" in run.stderr
-    for way in ("-o", "--resume", "--overwrite"):
-        assert way in run.stderr
+    told = excite.refused("optimize", SMOKE, "-o", path, *BRIEF)
+    assert f"{path} exists already" in told
+    assert all(way in told for way in ("-o", "--resume", "--overwrite"))
     assert path.read_bytes() == two_motions.path.read_bytes()
-    assert run.stdout == ""
 
 
 def test_overwrite_leaves_the_old_file_where_nothing_replaces_it(excite: Program) -> None:
     path = excite.folder / "arm.h5"
     path.write_text("kept", encoding="utf-8")
-    run = excite("optimize", SMOKE, "-o", path, "--overwrite", "--set", "optimizer.max_itertions=1")
-    assert run.returncode == 2
-    assert "Did you mean 'max_iterations'?" in run.stderr
+    excite.refused("optimize", SMOKE, "-o", path, "--overwrite", "--set", "optimizer.max_seconds=x")
     assert path.read_text(encoding="utf-8") == "kept"
 
 
 def test_overwrite_with_tables_on_stdout_and_details_on_stderr(excite: Program) -> None:
     path = excite.folder / "arm.h5"
     path.write_text("to be replaced", encoding="utf-8")
-    run = excite("optimize", SMOKE, "-o", path, *BRIEF, "--motions", "1", "--overwrite", "-v")
-    assert run.returncode == 0
+    run = excite.good("optimize", SMOKE, "-o", path, *BRIEF, "--motions", "1", "--overwrite", "-v")
     (motion,) = read_result(path).motions
     assert f"{motion.condition_number:.2f}" in run.stdout
     for word in ("joint_torque", "self_collision", "rad/s²", str(path)):
@@ -120,14 +102,6 @@ def test_a_prior_makes_the_stack_better_than_the_motion(excite: Program, two_mot
     )
 
 
-def test_a_prior_of_another_robot_is_refused(excite: Program, two_motions: Run) -> None:
-    others = "robot.joints=[shoulder_pitch, elbow, wrist_roll, slide]"
-    run = excite("optimize", SMOKE, "--set", others, *BRIEF, "--prior", two_motions.path)
-    assert run.returncode == 2
-    assert f"--prior {two_motions.path} cannot be stacked" in run.stderr
-    assert list(excite.folder.iterdir()) == []
-
-
 # What nothing can meet, with all other constraints that could be named instead.
 INFEASIBLE = {
     "balance": [
@@ -144,12 +118,8 @@ def test_an_impossible_constraint_is_named_and_nothing_is_written(
     excite: Program, kind: str
 ) -> None:
     changes = [word for change in INFEASIBLE[kind] for word in ("--set", change)]
-    run = excite("optimize", SMOKE, *BRIEF, *changes)
-    assert run.returncode == 1, run.stderr
-    reason = run.stderr.splitlines()[-1]
-    assert reason.startswith("error: No admissible motion")
-    assert kind in reason
-    assert run.stdout == ""
+    reason = excite.refused("optimize", SMOKE, *BRIEF, *changes, status=1)
+    assert kind in reason.partition("error: No admissible motion")[2]
     assert list(excite.folder.iterdir()) == []
 
 
@@ -160,6 +130,32 @@ def test_paths_in_a_config_start_from_the_config(excite: Program) -> None:
     (place / "arm.yaml").write_text(text, encoding="utf-8")
     urdf = (SMOKE.parent / "../data/smoke_arm.urdf").read_text(encoding="utf-8")
     (place / "arm.urdf").write_text(urdf, encoding="utf-8")
-    run = excite("optimize", "place/arm.yaml", *BRIEF, "--motions", "1")
-    assert run.returncode == 0, run.stderr
+    excite.good("optimize", "place/arm.yaml", *BRIEF, "--motions", "1")
     assert (excite.folder / "arm.h5").is_file()
+
+
+FEW = (
+    "--set", "optimizer.max_iterations=4", "--set", "constraints.self_collision=null",
+    "--set", "optimizer.max_seconds=600", "--motions", "1",
+)  # fmt: skip
+
+
+def test_starts_shared_by_two_are_stored_alike(excite: Program) -> None:
+    asked = ("optimize", SMOKE, *FEW, "--starts", "2", "--json")
+    runs = [excite(*asked, "-o", "alone.h5"), excite(*asked, "-o", "shared.h5", "--workers", "200")]
+    assert "200 workers share" in runs[1].stderr
+    assert "hint: 2 starts" in runs[1].stderr
+    assert "hint" not in runs[0].stderr
+    alone, shared = (json.loads(run.stdout) for run in runs)
+    assert alone["motions"][0]["iterations"] == 8
+    for answer in (alone, shared):
+        del answer["motions"][0]["seconds"], answer["output"]
+    assert alone == shared
+    first, second = (read_result(excite.folder / f"{name}.h5") for name in ("alone", "shared"))
+    assert same(first, second)
+
+
+def test_two_places_are_one_too_many(excite: Program) -> None:
+    both = ("--workers", "2", "--scheduler", "tcp://127.0.0.1:9")
+    assert "give one of them" in excite.refused("optimize", SMOKE, *FEW, *both)
+    assert list(excite.folder.iterdir()) == []

@@ -1,121 +1,76 @@
-"""Mistyped names of every kind: one message, what was meant, exit status 2."""
-
-import sys
-from pathlib import Path
+"""Mistyped, missing and impossible words of every kind: one message, what was meant, status 2."""
 
 import pytest
 
-from excite_cli.cli.app import main
-from tests.cli.program import ROOT, SMOKE
+from tests.cli.program import ROOT, SMOKE, Program
 
-CONFIGS = ROOT / "configs"
-UR10, CELL = CONFIGS / "ur10.yaml", CONFIGS / "ur10_cell.yaml"
-
-
-def told(
-    words: list[str | Path], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> str:
-    """What the program says on stderr; nothing else may be printed."""
-    monkeypatch.setattr(sys, "argv", ["excite", *map(str, words)])
-    monkeypatch.setenv("NO_COLOR", "1")
-    with pytest.raises(SystemExit) as end:
-        main()
-    out, err = capsys.readouterr()
-    assert end.value.code == 2, err
-    assert out == ""
-    last = [line for line in err.splitlines() if line.startswith("error: ")]
-    assert len(last) == 1, err
-    assert "\x1b" not in err
-    assert not err.startswith("Usage:")
-    return last[0]
+UR10, CELL = ROOT / "configs" / "ur10.yaml", ROOT / "configs" / "ur10_cell.yaml"
 
 
 @pytest.mark.parametrize(
     ("words", "meant"),
     [
-        (["optmize", SMOKE], "'optimize'"),
         (["optimize", SMOKE, "--overwite"], "'--overwrite'"),
         (["check", SMOKE, "x.h5", "--ranodm", "3"], "'--random'"),
+        (["schema", "--jsno"], "'--json'"),
         (["export", "x.h5", "--format", "rso2"], "'ros2'"),
         (["robots", "ur1O"], "'ur10'"),
-        (["verify-gradient", UR10, "--set", "trajectory.harmoncs=3"], "'harmonics'"),
-        (["verify-gradient", UR10, "--set", "robot.urdf=ur10"], "'example-robot-data:ur10'"),
-        (["verify-gradient", UR10, "--set", "robot.urdf=example-robot-data:ur1O"], "'ur10'"),
-        (["verify-gradient", UR10, "--set", "robot.joints=[elbo_joint]"], "'elbow_joint'"),
-        (["verify-gradient", UR10, "--set", "robot.posture={elbow: 1}"], "'elbow_joint'"),
-        (["verify-gradient", UR10, "--set", "robot.limits={elbo: {velocity: 1}}"], "'elbow_joint'"),
-        (["verify-gradient", UR10, "--set", "effects=[{kind: sprin}]"], "'spring'"),
-        (["verify-gradient", UR10, "--set", "constraints.torqe.scale=1"], "'torque'"),
-        (["verify-gradient", UR10, "--set", "constraints.balance.kind=dsc"], "'disc'"),
-        (["verify-gradient", CELL, "--set", "robot.payload.link=tool1"], "'tool0'"),
+        ([UR10, "--set", "trajectory.harmoncs=3"], "'harmonics'"),
+        ([UR10, "--set", "robot.urdf=ur10"], "'example-robot-data:ur10'"),
+        ([UR10, "--set", "robot.urdf=example-robot-data:ur1O"], "'ur10'"),
+        ([UR10, "--set", "robot.joints=[elbo_joint]"], "'elbow_joint'"),
+        ([UR10, "--set", "robot.posture={elbow: 1}"], "'elbow_joint'"),
+        ([UR10, "--set", "robot.limits={elbo: {velocity: 1}}"], "'elbow_joint'"),
+        ([UR10, "--set", "effects=[{kind: sprin}]"], "'spring'"),
+        ([UR10, "--set", "constraints.torqe.scale=1"], "'torque'"),
+        ([UR10, "--set", "constraints.balance.kind=dsc"], "'disc'"),
+        ([CELL, "--set", "robot.payload.link=tool1"], "'tool0'"),
     ],
 )
 def test_a_mistyped_name_is_answered_with_the_nearest(
-    words: list[str | Path],
-    meant: str,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    words: list[str], meant: str, excite: Program
 ) -> None:
-    assert f"Did you mean {meant}?" in told(words, capsys, monkeypatch)
+    command = [] if isinstance(words[0], str) else ["verify-gradient"]
+    assert f"Did you mean {meant}?" in excite.refused(*command, *words)
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (["optimize"], "excite optimize: CONFIG is missing. Usage: excite optimize CONFIG"),
+        (["optimize", SMOKE, "--motions", "0"], "--motions: "),
+        (["optimize", SMOKE, "--motions", "some"], "--motions: "),
         (["optimize", SMOKE, "--seed"], "--seed needs a value."),
         (["optimize", SMOKE, "--seed", "-1"], "--seed: "),
         (["optimize", SMOKE, SMOKE], "unexpected: "),
-        (["export", "x.h5"], "excite export: --format is missing. Usage: excite export FILE --for"),
+        (["optimize", SMOKE, "-o", "."], ". is a folder"),
         (["optimize", "."], ". is a folder, not a config."),
-        (["optimize", "x.yaml"], "There is no config file x.yaml."),
+        (["check", SMOKE], "FILE is missing."),
+        (["check", SMOKE, "none.h5", "--rate", "0"], "--rate"),
+        (["compare-random", SMOKE, "--optimized", "none.h5"], "There is no file none.h5"),
+        (["export", "x.h5"], "excite export: --format is missing. Usage: excite export FILE --for"),
         (["robots", "."], ". is a folder. Give a URDF file"),
-    ],
-)
-def test_what_is_missing_or_of_another_kind(
-    words: list[str | Path],
-    said: str,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert said in told(words, capsys, monkeypatch)
-
-
-@pytest.mark.parametrize(
-    ("words", "meant"),
-    [
+        (["verify-gradient", SMOKE, "--set", "sampling.cost.step=0.2"], "sampling.cost: 60"),
+        (
+            ["verify-gradient", CELL, "--set", "robot.payload.start=[0, 0]"],
+            "robot.payload.start: 3 values needed (given: 2).",
+        ),
+        # A suggested name is quoted for a shell.
         (["init", "my arm's.urdf"], "--urdf 'my arm'\"'\"'s.urdf'?"),
         (["init", "my", "arm.urdf"], "--urdf NAME?"),
     ],
 )
-def test_a_suggested_name_is_quoted_for_a_shell(
-    words: list[str | Path],
-    meant: str,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    assert told(words, capsys, monkeypatch).endswith(meant)
+def test_what_is_missing_or_of_another_kind(words: list[str], said: str, excite: Program) -> None:
+    assert said in excite.refused(*words)
+    assert list(excite.folder.iterdir()) == []
 
 
-def test_a_key_is_told_with_its_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_key_is_told_with_its_line(excite: Program) -> None:
     text = "robot: {urdf: example-robot-data:ur10}\nseed: 1\ntrajectory:\n  harmoncs: 3\n"
-    (tmp_path / "arm.yaml").write_text(text, encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    message = told(["verify-gradient", "arm.yaml"], capsys, monkeypatch)
+    (excite.folder / "arm.yaml").write_text(text, encoding="utf-8")
+    message = excite.refused("verify-gradient", "arm.yaml")
     assert message.startswith("error: arm.yaml, line 4: trajectory.harmoncs: unknown key.")
     assert "Did you mean 'harmonics'? Allowed here: " in message
-    (tmp_path / "arm.yaml").write_text(text.replace("harmoncs: 3", "family: fourier"))
-    message = told(["verify-gradient", "arm.yaml", "--set", "seed=x"], capsys, monkeypatch)
+    (excite.folder / "arm.yaml").write_text(text.replace("harmoncs: 3", "family: fourier"))
+    message = excite.refused("verify-gradient", "arm.yaml", "--set", "seed=x")
     assert "line" not in message  # it is not the file that says so
-
-
-def test_three_numbers_are_asked_for_where_two_are_given(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    words = ["verify-gradient", CELL, "--set", "robot.payload.start=[0, 0]"]
-    message = told(words, capsys, monkeypatch)
-    assert "robot.payload.start: 3 values needed (given: 2)." in message

@@ -46,21 +46,6 @@ def test_the_same_as_in_a_process_of_its_own(
     assert here.stdout or here.stderr
 
 
-@pytest.mark.parametrize(
-    ("code", "status", "told"),
-    [(None, 0, ""), (3, 3, ""), (256, 0, ""), ("no such thing", 1, "no such thing\n")],
-)
-def test_exit_statuses(printed: Printed, code: object, status: int, told: str) -> None:
-    assert printed(lambda: sys.exit(code)) == (status, "", told)
-
-
-def test_an_exception_that_gets_through_is_a_traceback(printed: Printed) -> None:
-    status, out, err = printed(lambda: 1 / 0)
-    assert (status, out) == (1, "")
-    assert err.startswith("Traceback")
-    assert err.endswith("ZeroDivisionError: division by zero\n")
-
-
 def test_python_c_and_children_print_into_the_same_place(printed: Printed) -> None:
     def main() -> None:
         print("Python", flush=True)

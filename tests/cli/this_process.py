@@ -14,11 +14,12 @@ import tempfile
 import traceback
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, chdir, contextmanager
 from pathlib import Path
 from subprocess import CompletedProcess
 from types import FrameType
 from typing import Any, TextIO
+from unittest.mock import patch
 
 from threadpoolctl import threadpool_limits
 
@@ -45,15 +46,20 @@ def call(
     command = ["excite", *arguments]
     with ExitStack() as stack:
         files = [stack.enter_context(tempfile.TemporaryFile()) for _ in range(2)]
-        with ExitStack() as around:
-            # The streams come last and go first, so that whatever else fails is seen.
-            for each in (_place(folder, environment), _signals(), _alarm(patience), _quiet_logs()):
-                around.enter_context(each)
-            around.enter_context(threadpool_limits(limits=1))
-            around.enter_context(_argv(command))
-            around.enter_context(_imports(folder))
-            around.enter_context(_streams(files))
-            around.enter_context(_warnings())
+        # The streams come last and go first, so that whatever else fails is seen. Without pytest's
+        # handlers Python's own prints warnings of logs, as in the program.
+        with (
+            chdir(folder),
+            patch.dict(os.environ, environment, clear=True),
+            patch.object(logging.getLogger(), "handlers", []),
+            patch.object(sys, "argv", command),
+            _signals(),
+            _alarm(patience),
+            threadpool_limits(limits=1),
+            _imports(folder),
+            _streams(files),
+            _warnings(),
+        ):
             status = _status(main)
         told = []
         for file in files:
@@ -78,33 +84,6 @@ def _status(main: Callable[[], None]) -> int:
 
 
 @contextmanager
-def _place(folder: Path, environment: dict[str, str]) -> Iterator[None]:
-    before, variables = Path.cwd(), dict(os.environ)
-    os.chdir(folder)
-    _replace(environment)
-    try:
-        yield
-    finally:
-        _replace(variables)
-        os.chdir(before)
-
-
-def _replace(variables: dict[str, str]) -> None:
-    for name in os.environ.keys() - variables.keys():
-        del os.environ[name]
-    os.environ.update(variables)
-
-
-@contextmanager
-def _argv(command: list[str]) -> Iterator[None]:
-    before, sys.argv = sys.argv, command
-    try:
-        yield
-    finally:
-        sys.argv = before
-
-
-@contextmanager
 def _signals() -> Iterator[None]:
     before = {each: signal.getsignal(each) for each in _HEEDED}
     try:
@@ -126,17 +105,6 @@ def _alarm(patience: float) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
-
-
-@contextmanager
-def _quiet_logs() -> Iterator[None]:
-    """Without pytest's handlers, so that Python's own prints warnings, as in the program."""
-    root = logging.getLogger()
-    before, root.handlers = root.handlers, []
-    try:
-        yield
-    finally:
-        root.handlers = before
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""What a case asks for: the same request only for the same settings and the same files."""
+"""The cases of a study: their names, and requests that are the same only for the same question."""
 
 import shutil
 from pathlib import Path
@@ -9,7 +9,7 @@ from excite_cli.api.studying import do_case
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.study.case import StudyTask
 from excite_cli.study.plan import planned_cases
-from excite_cli.study.vary import Varied
+from excite_cli.study.vary import Varied, parse_vary
 
 ARM = Path(__file__).parents[2] / "data" / "smoke_arm.urdf"
 SEEDS = [Varied("seed", ("1", "2"))]
@@ -30,16 +30,21 @@ def _requests(task: StudyTask) -> list[str]:
     return [case.request for case in planned_cases(task, [log], SEEDS)]
 
 
+def _names(task: StudyTask, logs: list[Path], *varied: str) -> list[str]:
+    return [case.name for case in planned_cases(task, logs, list(map(parse_vary, varied)))]
+
+
 @pytest.mark.parametrize("name", ["arm.urdf", "fit.h5", "log.csv"])
 def test_other_contents_of_a_file_are_another_request(name: str, task: StudyTask) -> None:
     before = _requests(task)
     path = task.config.parent / name
     text = path.read_text()
     path.write_text(text.replace("2", "3").replace("fit", "tif"))  # of the same length
-    after = _requests(task)
-    assert not set(before) & set(after)
+    assert not set(before) & set(_requests(task))
     path.write_text(text)  # another time of change
     assert _requests(task) == before
+    other = StudyTask(task.config, ("trajectory.harmonics=2",))
+    assert not set(before) & set(_requests(other))
 
 
 def test_a_case_whose_config_was_changed_meanwhile_fails(task: StudyTask) -> None:
@@ -49,16 +54,42 @@ def test_a_case_whose_config_was_changed_meanwhile_fails(task: StudyTask) -> Non
         do_case(task, first, lambda word: None)
 
 
-def test_the_same_asked_in_two_ways_is_refused(task: StudyTask) -> None:
-    with pytest.raises(ConfigError, match=r"seed=1 and seed=0x1 ask for the same"):
-        planned_cases(task, [], [Varied("seed", ("1", "2", "0x1"))])
+@pytest.mark.parametrize(
+    ("logs", "vary", "said"),
+    [
+        ([], ["seed=1,2,0x1"], r"seed=1 and seed=0x1 ask for the same"),
+        ([], ["seeds=1,2"], "Did you mean 'seed'"),
+        ([], ["trajectory.harmonics=4,-1"], r"trajectory\.harmonics"),
+        ([], [], "something to vary"),
+        ([Path("nothing.h5")], [], "There is no file"),
+    ],
+)
+def test_everything_is_checked_before_the_work(
+    logs: list[Path], vary: list[str], said: str, task: StudyTask
+) -> None:
+    with pytest.raises((ConfigError, FileError), match=said):
+        _names(task, logs, *vary)
 
 
-def test_names_are_cut_by_the_bytes_that_they_take(task: StudyTask) -> None:
-    logs = [task.config.parent / f"{'測' * 80}{end}.csv" for end in "ab"]
-    for log in logs:
-        log.write_text(log.stem)
-    names = [case.name for case in planned_cases(task, logs, [])]
+def test_names_say_what_is_varied_and_are_names_of_files(task: StudyTask) -> None:
+    assert _names(task, [], "constraints.torque={scale: 0.5},null", "seed=1,2") == [
+        "torque=scale-0.5_seed=1",
+        "torque=scale-0.5_seed=2",
+        "torque=null_seed=1",
+        "torque=null_seed=2",
+    ]
+    varied = ("optimizer.tolerance=1e-3,0.01", "seed=3")
+    assert _names(task, [], *varied)[0] == "tolerance=1e-3_seed=3"
+    folder = task.config.parent
+    same = [folder / "run.h5", folder / "other" / "run.h5"]
+    long = [folder / f"{'測' * 80}{end}.csv" for end in "ab"]  # cut by the bytes that they take
+    (folder / "other").mkdir()
+    for log in (*same, *long):
+        log.write_text(str(log))
+    names = _names(task, same)
+    assert len(set(names)) == 2
+    assert all(name.startswith("run_") for name in names)
+    names = _names(task, long)
     assert len(set(names)) == 2
     for name in names:
-        (task.config.parent / f".{name}.diagnosis.h5.abcdefgh.part").write_text("")
+        (folder / f".{name}.diagnosis.h5.abcdefgh.part").write_text("")

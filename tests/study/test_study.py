@@ -47,9 +47,6 @@ def test_a_failing_case_is_a_row(done: Done, tmp_path: Path) -> None:
     assert [row["error"] for row in rows] == ["", "nothing fits", ""]
     assert (tmp_path / "s" / "seed-3.motions.h5").read_bytes() == b"seed-3"
     assert json.loads((tmp_path / "s" / "seed-2.json").read_text())["message"] == "nothing fits"
-
-
-def test_a_bug_in_a_case_says_that_it_is_one(done: Done, tmp_path: Path) -> None:
     done.broken = KeyError("shoulder")
     assert "a bug of excite" in run_study(TASK, CASES, tmp_path, done)[1].message
 
@@ -81,11 +78,12 @@ def test_a_folder_is_not_written_over(done: Done, tmp_path: Path) -> None:
     run_study(TASK, CASES[:1], tmp_path, done)
 
 
+def stop(news: StudyNews) -> None:
+    raise KeyboardInterrupt
+
+
 def test_with_overwrite_all_is_done_again(done: Done, tmp_path: Path) -> None:
     run_study(TASK, CASES[:1], tmp_path, done)
-
-    def stop(news: StudyNews) -> None:
-        raise KeyboardInterrupt
 
     other = [StudyCase(c.name, c.values, None, f"another {c.request}") for c in CASES]
     with pytest.raises(KeyboardInterrupt):
@@ -99,7 +97,7 @@ def test_with_overwrite_all_is_done_again(done: Done, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "record",
     ["{", "[]", '{"schema": 1}', "FIGURES", "FILES", "[" * 100_000],
-    ids=["cut", "list", "little", "figures", "files", "deep"],
+    ids=lambda record: record[:9],
 )
 def test_a_damaged_record_is_none(record: str, done: Done, tmp_path: Path) -> None:
     run_study(TASK, CASES[:1], tmp_path, done)
@@ -123,9 +121,6 @@ def test_two_studies_in_one_folder_are_refused(done: Done, tmp_path: Path) -> No
 
 
 def test_an_interrupted_study_keeps_what_was_done(done: Done, tmp_path: Path) -> None:
-    def stop(news: StudyNews) -> None:
-        raise KeyboardInterrupt
-
     with pytest.raises(KeyboardInterrupt):
         run_study(TASK, CASES, tmp_path, done, report=stop)
     done.names.clear()

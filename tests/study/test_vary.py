@@ -1,16 +1,9 @@
-"""What --vary says, and the cases that come of it."""
-
-from pathlib import Path
+"""What --vary says, and all combinations of it."""
 
 import pytest
 
-from excite_cli.errors import ConfigError, FileError
-from excite_cli.study.case import StudyTask
-from excite_cli.study.plan import planned_cases
+from excite_cli.errors import ConfigError
 from excite_cli.study.vary import Varied, combinations, parse_vary
-
-SMOKE = Path(__file__).parents[2] / "configs" / "smoke.yaml"
-TASK = StudyTask(SMOKE, ())
 
 
 @pytest.mark.parametrize(
@@ -55,43 +48,3 @@ def test_all_combinations_the_last_key_fastest() -> None:
     long = tuple(map(str, range(1000)))
     with pytest.raises(ConfigError, match="1000000 combinations"):
         combinations([Varied("a", long), Varied("b", long)])
-
-
-def test_names_say_what_is_varied_and_are_names_of_files(tmp_path: Path) -> None:
-    varied = [parse_vary("constraints.torque={scale: 0.5},null"), parse_vary("seed=1,2")]
-    names = [case.name for case in planned_cases(TASK, [], varied)]
-    assert names == [
-        "torque=scale-0.5_seed=1", "torque=scale-0.5_seed=2", "torque=null_seed=1",
-        "torque=null_seed=2",
-    ]  # fmt: skip
-    varied = [parse_vary("optimizer.tolerance=1e-3,0.01"), parse_vary("seed=3")]
-    assert planned_cases(TASK, [], varied)[0].name == "tolerance=1e-3_seed=3"
-    logs = [tmp_path / "run.h5", tmp_path / "other" / "run.h5"]
-    for log in logs:
-        log.parent.mkdir(exist_ok=True)
-        log.write_bytes(b"")
-    same = [case.name for case in planned_cases(TASK, logs, [])]
-    assert len(set(same)) == 2
-    assert all(name.startswith("run_") for name in same)
-
-
-def test_everything_is_checked_before_the_work() -> None:
-    with pytest.raises(ConfigError, match="Did you mean 'seed'"):
-        planned_cases(TASK, [], [parse_vary("seeds=1,2")])
-    with pytest.raises(ConfigError, match=r"trajectory\.harmonics"):
-        planned_cases(TASK, [], [parse_vary("trajectory.harmonics=4,-1")])
-    with pytest.raises(ConfigError, match="something to vary"):
-        planned_cases(TASK, [], [])
-    with pytest.raises(FileError, match="There is no file"):
-        planned_cases(TASK, [Path("nothing.h5")], [])
-
-
-def test_a_request_is_all_that_is_asked(tmp_path: Path) -> None:
-    log = tmp_path / "run.h5"
-    log.write_bytes(b"one")
-    first = planned_cases(TASK, [log], [])[0].request
-    assert planned_cases(TASK, [log], [])[0].request == first
-    log.write_bytes(b"longer")
-    assert planned_cases(TASK, [log], [])[0].request != first
-    other = StudyTask(SMOKE, ("seed=5",))
-    assert planned_cases(other, [log], [])[0].request != first

@@ -6,8 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from excite_cli.kernels import compiled as kernels
 from excite_cli.out_of_core import Spool, attached, forget, reference_to
 from excite_cli.workers.base import POSSIBLE, packed
+from excite_cli.workers.cluster import environment
 from excite_cli.workers.processes import Processes
 from tests.workers import work
 
@@ -45,23 +47,16 @@ def test_a_repeated_value_travels_as_one() -> None:
         assert np.array_equal(pickle.loads(message), each)
 
 
-def test_large_results_of_a_process_outlive_it() -> None:
+def test_large_results_of_a_process_outlive_it_and_parts_of_what_it_was_given_come_back() -> None:
+    """The file of what is given is open there only while the task is done."""
+    factors = (1.0, 2.0, 3.0)
     with Processes(2) as workers:
-        found = workers.map(work.table, 100_000, [1.0, 2.0, 3.0])
-        again = workers.map(work.doubled, None, found)
-    for factor, table, twice in zip((1.0, 2.0, 3.0), found, again, strict=True):
+        found = workers.map(work.table, 100_000, factors)
+        halves = workers.map(work.doubled_half, None, found)
+    for factor, table, half in zip(factors, found, halves, strict=True):
         assert np.array_equal(table, factor * np.arange(100_000.0))
-        assert np.array_equal(twice, 2.0 * table)
-
-
-def test_part_of_what_a_process_was_given_comes_back() -> None:
-    """Its file is open there only while the task is done."""
-    with Processes(2) as workers:
-        given = workers.map(work.table, 100_000, [1.0, 2.0])
-        found = workers.map(work.second_half, None, given)
-    assert all(
-        np.array_equal(half, whole[50_000:]) for half, whole in zip(found, given, strict=True)
-    )
+        assert np.array_equal(half[0], 2.0 * table)
+        assert np.array_equal(half[1], table[50_000:])
 
 
 def test_a_file_that_is_gone_is_an_error(tmp_path: Path) -> None:
@@ -69,3 +64,11 @@ def test_a_file_that_is_gone_is_an_error(tmp_path: Path) -> None:
     assert reference is not None
     with pytest.raises(FileNotFoundError):
         attached(reference)
+
+
+def test_workers_without_the_compiled_loops_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernels, "KERNELS", object())
+    here = environment.__wrapped__()
+    monkeypatch.setattr(kernels, "KERNELS", None)
+    assert here.against(here) == ""
+    assert here.against(environment.__wrapped__()) == "kernels compiled here, numpy there"

@@ -11,7 +11,7 @@ from excite_cli.errors import ConfigError, MissingExtraError, NoAdmissibleMotion
 from excite_cli.workers.base import News
 from excite_cli.workers.cluster import Cluster, ClusterError, Environment, environment
 from tests.api.conftest import SMOKE
-from tests.api.test_on_disk import same
+from tests.api.test_same_answers import same
 from tests.workers import work
 
 distributed = pytest.importorskip("distributed")
@@ -46,11 +46,8 @@ def test_results_and_failures_are_those_of_processes(cluster: Cluster) -> None:
     assert [type(each) for each in kept] == [int, ConfigError, ConfigError]
 
 
-def test_linear_algebra_is_limited(cluster: Cluster) -> None:
-    assert set(cluster.map(work.threads, 0, [1])[0]) == {1}
-
-
 def test_a_lost_worker_costs_its_task_a_second_try(cluster: Cluster, tmp_path: Path) -> None:
+    assert set(cluster.map(work.threads, 0, [1])[0]) == {1}
     assert cluster.map(work.dies_once, str(tmp_path), [2]) == [4]
 
 

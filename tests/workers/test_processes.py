@@ -66,23 +66,14 @@ def test_tasks_are_taken_when_somebody_is_there_to_do_them(two: Processes) -> No
     assert two.map(work.square, 0, iter(())) == []
 
 
-def test_what_the_source_of_tasks_raises_is_raised() -> None:
+def test_what_the_source_of_tasks_raises_is_raised(two: Processes) -> None:
     def tasks() -> Iterator[int]:
         yield 1
         raise ConfigError("no second task")
 
-    with Processes(2) as workers:
-        with pytest.raises(ConfigError, match="no second task"):
-            workers.map(work.square, 0, tasks())
-        assert workers.map(work.square, 0, [2, 3]) == [4, 9]
-
-
-def test_workers_begin_ahead_with_what_the_parent_has_imported() -> None:
-    with Processes(2) as workers:
-        workers.begin()
-        assert len(workers.pids) == 2
-        found = workers.map(work.imported, "excite_cli.workers.processes", [0])
-        assert found == [True]
+    with pytest.raises(ConfigError, match="no second task"):
+        two.map(work.square, 0, tasks())
+    assert two.map(work.square, 0, [2, 3]) == [4, 9]
 
 
 def test_everything_is_told(workers: Workers) -> None:
@@ -98,9 +89,6 @@ def test_everything_is_told(workers: Workers) -> None:
 def test_the_first_failure_is_raised_whoever_was_ready_first(workers: Workers) -> None:
     with pytest.raises(ConfigError, match="task 1 is wrong"):
         workers.map(work.fails, 1, [0, 1, 2, 3])
-
-
-def test_failures_can_be_kept(workers: Workers) -> None:
     first, second, third = workers.map(work.fails, 1, [0, 1, 2], keep_failures=True)
     assert first == 0
     assert isinstance(second, ConfigError)
@@ -115,15 +103,17 @@ def test_after_a_failure_nobody_waits_for_later_tasks(two: Processes) -> None:
     assert two.map(work.square, 0, [2, 3, 4]) == [4, 9, 16]
 
 
-def test_the_current_folder_is_no_part_of_a_worker(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_worker_has_its_threads_and_no_part_of_the_current_folder(
+    two: Processes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("json", "sys", "pickle"):
         (tmp_path / f"{name}.py").write_text("raise SystemExit('code of the current folder')")
     monkeypatch.syspath_prepend(str(tmp_path / "modules"))
     monkeypatch.chdir(tmp_path)
-    with Processes(1) as one:
+    with Processes(1, threads=2) as one:
         assert one.map(work.search_path, 0, [1]) == [sys.path]
+        assert set(one.map(work.threads, 0, [1])[0]) == {min(2, os.cpu_count() or 2)}
+    assert set(two.map(work.threads, 0, [1])[0]) == {1}
 
 
 def test_errors_travel_as_the_nearest_that_can(two: Processes) -> None:
@@ -165,12 +155,6 @@ def test_one_killed_from_outside_changes_nothing(two: Processes, tmp_path: Path)
     assert len(two.pids) == 2
 
 
-def test_linear_algebra_is_limited(two: Processes) -> None:
-    with Processes(1, threads=2) as wide:
-        assert set(wide.map(work.threads, 0, [1])[0]) == {min(2, os.cpu_count() or 2)}
-    assert set(two.map(work.threads, 0, [1])[0]) == {1}
-
-
 def test_an_interrupt_leaves_nothing_behind() -> None:
     heard: list[int] = []
 
@@ -185,15 +169,14 @@ def test_an_interrupt_leaves_nothing_behind() -> None:
 
 
 def test_workers_end_when_their_parent_is_killed(tmp_path: Path) -> None:
-    script = (
-        "import time\n"
-        "from excite_cli.workers.processes import Processes\n"
-        "from tests.workers import work\n"
-        "workers = Processes(2)\n"
-        "workers.map(work.square, 0, [1, 2])\n"
-        "print(*workers.pids, flush=True)\n"
-        "workers.map(work.pid, None, [60.0, 60.0])\n"
-    )
+    script = """
+from excite_cli.workers.processes import Processes
+from tests.workers import work
+workers = Processes(2)
+workers.map(work.square, 0, [1, 2])
+print(*workers.pids, flush=True)
+workers.map(work.later_first, 60.0, [0, 0])
+"""
     root = Path(__file__).parents[2]
     parent = subprocess.Popen(
         [sys.executable, "-c", script], cwd=root, stdout=subprocess.PIPE, text=True
@@ -210,10 +193,13 @@ def test_workers_end_when_their_parent_is_killed(tmp_path: Path) -> None:
 
 def test_what_is_asked_for_decides_where() -> None:
     assert isinstance(open_workers(), Here)
-    with open_workers(3) as three:
-        assert isinstance(three, Processes)
-        assert three.count == 3
-        assert three.pids == (), "processes were started before there is a task"
+    with open_workers(2) as workers:
+        assert isinstance(workers, Processes)
+        assert (workers.count, workers.pids) == (2, ()), "they begin before there is a task"
+        workers.begin()
+        assert len(workers.pids) == 2
+        # They have what the parent has imported.
+        assert workers.map(work.imported, "excite_cli.workers.processes", [0]) == [True]
     with pytest.raises(ConfigError, match="give one of them"):
         open_workers(2, "tcp://localhost:8786")
     with pytest.raises(ConfigError, match="Allowed are 1 to"):

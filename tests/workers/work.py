@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_info
 
 from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.workers.base import Tell
@@ -71,11 +72,6 @@ def always_dies(shared: Any, task: int, tell: Tell) -> int:
     return task
 
 
-def pid(shared: Any, task: float, tell: Tell) -> int:
-    time.sleep(task)
-    return os.getpid()
-
-
 def begun(folder: str, task: int, tell: Tell) -> int:
     """The process that did it: it says that it has begun, and waits for the file `go`."""
     (Path(folder) / f"{os.getpid()}.begun").touch()
@@ -89,9 +85,6 @@ def search_path(shared: Any, task: Any, tell: Tell) -> list[str]:
 
 
 def threads(shared: Any, task: int, tell: Tell) -> list[int]:
-    import numpy as np
-    from threadpoolctl import threadpool_info
-
     np.linalg.qr(np.eye(3))
     return [each["num_threads"] for each in threadpool_info()]
 
@@ -100,12 +93,11 @@ def table(size: int, factor: float, tell: Tell) -> NDArray[np.float64]:
     return factor * np.arange(float(size))
 
 
-def doubled(shared: None, values: NDArray[np.float64], tell: Tell) -> NDArray[np.float64]:
-    return 2.0 * values
-
-
-def second_half(shared: None, values: NDArray[np.float64], tell: Tell) -> NDArray[np.float64]:
-    return values[len(values) // 2 :]
+def doubled_half(
+    shared: None, values: NDArray[np.float64], tell: Tell
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """All of it doubled, and the second half of it as it came."""
+    return 2.0 * values, values[len(values) // 2 :]
 
 
 def imported(shared: str, task: int, tell: Tell) -> bool:
