@@ -14,10 +14,6 @@ from tests.measurement.recordings import motion, only, recorded
 STEP = 1 / 200
 
 
-def taken(run: Run, keep: np.ndarray) -> Run:
-    return rows_of(run, keep)
-
-
 def follows_the_motion(run: Run, within: float = 1e-5) -> None:
     """Positions are those of the motion at the stamps, which are equidistant."""
     steps = np.diff(run.t)
@@ -45,7 +41,7 @@ def test_jitter_is_resampled() -> None:
 def test_a_gap_splits_the_run() -> None:
     run = recorded()
     keep = (run.t < 3.0) | (run.t >= 3.3)
-    parts, findings = equidistant(taken(run, keep))
+    parts, findings = equidistant(rows_of(run, keep))
     found = only(findings, "gap")
     assert "1 gap in time, the longest of 0.305 s at 2.995 s" in found.text
     assert [part.label for part in parts] == ["run/1", "run/2"]
@@ -60,7 +56,7 @@ def test_a_short_gap_is_bridged_and_masked() -> None:
     run = recorded()
     keep = np.ones(len(run.t), bool)
     keep[[500, 501, 900]] = False
-    (back,), findings = equidistant(taken(run, keep))
+    (back,), findings = equidistant(rows_of(run, keep))
     assert "2 short gaps of up to 0.015 s" in only(findings, "bridged").text
     assert len(back.t) == len(run.t)
     follows_the_motion(back)
@@ -70,7 +66,7 @@ def test_a_short_gap_is_bridged_and_masked() -> None:
 def test_short_parts_are_left_out_and_said() -> None:
     run = recorded()
     keep = (run.t < 3.0) | (run.t >= 3.2) & (run.t < 3.4) | (run.t > 3.8)
-    parts, findings = equidistant(taken(run, keep))
+    parts, findings = equidistant(rows_of(run, keep))
     assert [found.kind for found in findings] == ["gap", "short_part"]
     assert "1 parts shorter than 0.5 s" in findings[1].text
     assert [part.label for part in parts] == ["run/1", "run/2"]
@@ -81,14 +77,14 @@ def test_samples_in_another_order() -> None:
     order = np.arange(len(run.t))
     order[[300, 301, 302, 303]] = [303, 300, 301, 302]
     order[[700, 701]] = [701, 700]
-    (back,), findings = equidistant(taken(run, order))
+    (back,), findings = equidistant(rows_of(run, order))
     assert "goes back 2 times" in only(findings, "reordered").text
     np.testing.assert_array_equal(back.tau, run.tau)
 
 
 def test_duplicates() -> None:
     run = recorded()
-    (back,), findings = equidistant(taken(run, np.sort(np.r_[0:1600, 10, 20, 30])))
+    (back,), findings = equidistant(rows_of(run, np.sort(np.r_[0:1600, 10, 20, 30])))
     assert "3 samples carry the same stamp" in only(findings, "duplicate_stamps").text
     np.testing.assert_array_equal(back.q, run.q)
 
@@ -140,6 +136,6 @@ def test_time_that_cannot_be_used() -> None:
         equidistant(replace(run, t=np.full(len(run.t), 3.0)))
     with pytest.raises(FileError, match="has 5 samples; at least 10"):
         equidistant(run.cut(0, 5))
-    scattered = taken(run, np.arange(len(run.t)) % 40 < 10)
+    scattered = rows_of(run, np.arange(len(run.t)) % 40 < 10)
     with pytest.raises(FileError, match=r"falls into 40 pieces.*too irregular"):
         equidistant(scattered)
