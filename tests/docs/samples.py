@@ -142,7 +142,7 @@ class Samples:
         _write_table(path, {"t": run.t, **columns})
 
     def _standing_bag(self, path: Path) -> None:
-        from tests.measurement.standing_bags import IMU, WRENCH, States, Topic, write_standing
+        from tests.measurement.bags import IMU, WRENCH, States, Topic, write_standing
 
         data = self._standing()
         run = data.runs[0]

@@ -75,6 +75,9 @@ def test_wrong_contents(tmp_path: Path) -> None:
         ("q", recorded().q.T, ("(3, 1600)",)),
         ("tau", recorded().tau.T, ("(3, 1600)", "transposed")),
         ("q", "words", ("does not hold numbers",)),
+        ("q", np.zeros(1600, [("a", "f8")]), ("does not hold numbers",)),
+        ("q", np.full((1600, 3), b"text"), ("does not hold numbers",)),
+        ("q", np.zeros((1600, 3), complex), ("does not hold numbers",)),
         ("q", np.zeros((1600, 3, 2)), ("(1600, 3, 2)",)),
         ("t", None, ("no time stamps 't'", "measurement.rate")),
     ):
@@ -84,8 +87,17 @@ def test_wrong_contents(tmp_path: Path) -> None:
     np.testing.assert_allclose(read(path, rate=200.0).runs[0].t, recorded().t)
 
 
-@pytest.mark.parametrize("kind", ["external", "soft", "external file", "virtual", "runs"])
-def test_links_and_foreign_storage_are_refused(tmp_path: Path, kind: str) -> None:
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("external", "is a link"),
+        ("soft", "is a link"),
+        ("external file", "keeps its data in other files"),
+        ("virtual", "keeps its data in other files"),
+        ("runs", "is a link"),
+    ],
+)
+def test_links_and_foreign_storage_are_refused(tmp_path: Path, kind: str, words: str) -> None:
     other = flat(tmp_path / "other.h5")
     path = flat(tmp_path / "a.h5")
     with h5py.File(path, "a") as file:
@@ -102,7 +114,7 @@ def test_links_and_foreign_storage_are_refused(tmp_path: Path, kind: str) -> Non
             file.create_virtual_dataset("tau", layout)
         else:
             file["runs"] = h5py.ExternalLink(str(other), "/")
-    refused(path, "only data in the file itself")
+    refused(path, words, "only data in the file itself")
 
 
 def test_giant_shapes_are_refused_unread(tmp_path: Path) -> None:

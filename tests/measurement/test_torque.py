@@ -20,15 +20,10 @@ def converted(run: Run, **spec: Any) -> Run:
     return to_joints(run, MeasurementSpec(**spec), JOINTS, TURNS)
 
 
-def test_as_recorded() -> None:
+def test_torque_as_recorded_of_motors_and_from_currents() -> None:
     run = recorded()
-    back = converted(run)
     for name in ("t", "q", "dq", "tau"):
-        np.testing.assert_array_equal(getattr(back, name), getattr(run, name))
-
-
-def test_current_to_joint_torque() -> None:
-    run = recorded()
+        np.testing.assert_array_equal(getattr(converted(run), name), getattr(run, name))
     ratio = {"shoulder": 100.0, "elbow": -50.0, "wrist": 30.0}
     back = converted(run, torque="current", gear_ratio=ratio, torque_constant=0.2,
                      sign={"wrist": -1})  # fmt: skip
