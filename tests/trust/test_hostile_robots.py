@@ -44,74 +44,64 @@ def chain(links: int, kind: str) -> str:
     return f'<robot name="c">{parts}{joints}</robot>'
 
 
-@pytest.mark.parametrize(
-    ("text", "word"),
-    [
-        (f"<!DOCTYPE robot [{BOMB}]><robot>&j;</robot>", "entities"),
-        ('<!DOCTYPE r [<!ENTITY e SYSTEM "file:///etc/passwd">]><robot>&e;</robot>', "entities"),
-        ("<robot>" + "<link name='a'>" * 5000 + "</link>" * 5000 + "</robot>", f"{MAX_DEPTH} lev"),
-        ("<robot>" + "<link/>" * 250_000 + "</robot>", "too large"),
-        (chain(MAX_LINKS + 1, "fixed"), f"up to {MAX_LINKS:,} links"),
-        (chain(MAX_MOVABLE + 2, "revolute"), f"{MAX_MOVABLE} movable joints"),
-        (urdf().replace("</robot>", joint("back", "hand", "base") + "</robot>"), "no first link"),
-        (urdf().replace("</robot>", joint("twin", "base", "hand") + "</robot>"), "two joints lead"),
-        (urdf().replace('name="wrist"', 'name="elbow"'), "two joints are called 'elbow'"),
-        (urdf().replace('xyz="0 0 0.5"', 'xyz="0 0 1e300"', 1), "not three numbers"),
-        (urdf().replace('xyz="0 0 0.5"', 'xyz="0 nan 0"', 1), "not three numbers"),
-        (urdf().replace('xyz="0 1 0"', 'xyz="1e308 1e308 0"', 1), "has the axis"),
-        (urdf().replace("<origin ", '<origin rpy="inf 0 0" ', 1), "<origin rpy"),
-        (urdf().replace('mass value="1"', 'mass value="-1"', 1), "a mass not negative"),
-        (urdf().replace('ixx="0.1"', 'ixx="nan"', 1), "finite numbers"),
-        (urdf().replace('radius="0.05"', 'radius="-1"', 1), "not a number"),
-    ],
-    ids=[
-        "billion laughs",
-        "external entity",
-        "depth",
-        "elements",
-        "links",
-        "joints",
-        "cycle",
-        "loop",
-        "twin joints",
-        "far",
-        "nan",
-        "axis",
-        "turn",
-        "mass",
-        "inertia",
-        "radius",
-    ],
-)
+ISLAND = link("x") + link("y") + joint("a", "x", "y") + joint("b", "y", "x")
+
+
+def beside(more: str) -> str:
+    """The arm, with more in it."""
+    return urdf().replace("</robot>", f"{more}</robot>")
+
+
+HOSTILE = {
+    "billion laughs": (f"<!DOCTYPE robot [{BOMB}]><robot>&j;</robot>", "entities"),
+    "external entity": (
+        '<!DOCTYPE r [<!ENTITY e SYSTEM "file:///etc/passwd">]><robot>&e;</robot>',
+        "entities",
+    ),
+    "depth": (
+        "<robot>" + "<link name='a'>" * 5000 + "</link>" * 5000 + "</robot>",
+        f"{MAX_DEPTH} lev",
+    ),
+    "elements": ("<robot>" + "<link/>" * 250_000 + "</robot>", "too large"),
+    "links": (chain(MAX_LINKS + 1, "fixed"), f"up to {MAX_LINKS:,} links"),
+    "joints": (chain(MAX_MOVABLE + 2, "revolute"), f"{MAX_MOVABLE} movable joints"),
+    "cycle": (beside(joint("back", "hand", "base")), "no first link"),
+    "loop": (beside(joint("twin", "base", "hand")), "two joints lead"),
+    "twin joints": (
+        urdf().replace('name="wrist"', 'name="elbow"'),
+        "two joints are called 'elbow'",
+    ),
+    "far": (urdf().replace('xyz="0 0 0.5"', 'xyz="0 0 1e300"', 1), "not three numbers"),
+    "nan": (urdf().replace('xyz="0 0 0.5"', 'xyz="0 nan 0"', 1), "not three numbers"),
+    "axis": (urdf().replace('xyz="0 1 0"', 'xyz="1e308 1e308 0"', 1), "has the axis"),
+    "turn": (urdf().replace("<origin ", '<origin rpy="inf 0 0" ', 1), "<origin rpy"),
+    "mass": (urdf().replace('mass value="1"', 'mass value="-1"', 1), "a mass not negative"),
+    "inertia": (urdf().replace('ixx="0.1"', 'ixx="nan"', 1), "finite numbers"),
+    "radius": (urdf().replace('radius="0.05"', 'radius="-1"', 1), "not a number"),
+    "island": (beside(ISLAND), "go round in a circle"),
+}
+
+
+@pytest.mark.parametrize(("text", "word"), HOSTILE.values(), ids=HOSTILE)
 def test_urdf(text: str, word: str, tmp_path: Path) -> None:
     assert word in refused(built, hostile(tmp_path, text))
 
 
-def test_islands_that_go_round_in_a_circle(tmp_path: Path) -> None:
-    island = link("x") + link("y") + joint("a", "x", "y") + joint("b", "y", "x")
-    text = urdf().replace("</robot>", island + "</robot>")
-    assert "go round in a circle" in refused(built, hostile(tmp_path, text))
+OUTSIDE = "../../../../../../etc/passwd"
 
 
 @pytest.mark.parametrize(
-    "name",
+    ("name", "target"),
     [
-        "../../../../../../etc/passwd",
-        "/etc/passwd",
-        "file:///etc/passwd",
-        "package://../../../../../../../etc/passwd",
+        *((name, "") for name in (OUTSIDE, "/etc/passwd", "file:///etc/passwd")),
+        (f"package://../{OUTSIDE}", ""),
+        *(("hand.stl", target) for target in ("/etc/passwd", "/dev/zero", "hand.stl", "none")),
     ],
 )
-def test_paths_that_leave_the_folder(name: str, tmp_path: Path) -> None:
-    text = urdf(collision=mesh(name))
-    message = refused(built, hostile(tmp_path, text))
-    assert "leaves the robot's own folders" in message or "was not found" in message
-
-
-@pytest.mark.parametrize("target", ["/etc/passwd", "/dev/zero", "hand.stl", "none"])
-def test_symbolic_links(target: str, tmp_path: Path) -> None:
-    (tmp_path / "hand.stl").symlink_to(target)
-    message = refused(built, hostile(tmp_path, urdf(collision=mesh("hand.stl"))))
+def test_paths_and_links_that_leave_the_folder(name: str, target: str, tmp_path: Path) -> None:
+    if target:
+        (tmp_path / "hand.stl").symlink_to(target)
+    message = refused(built, hostile(tmp_path, urdf(collision=mesh(name))))
     assert "leaves the robot's own folders" in message or "was not found" in message
 
 
@@ -122,23 +112,19 @@ def test_names_that_no_file_has(name: str, tmp_path: Path) -> None:
     assert len(message) < 1000
 
 
-@pytest.mark.parametrize(
-    ("suffix", "data", "word"),
-    [
-        ("stl", binary_stl(2**32 - 1), "cannot be loaded"),
-        ("stl", binary_stl()[:100], "cannot be loaded"),
-        ("stl", b"", "cannot be loaded"),
-        ("ply", CRASHING, "reading it fails"),
-        ("dae", VALID["dae"].replace(b'count="4"', b'count="99999999999"'), "cannot be loaded"),
-        ("blend", VALID["stl"], "of no known format"),
-        (
-            "stl",
-            binary_stl()[:84] + struct.pack("<12fH", *[float("nan")] * 12, 0) * 4,
-            "not finite",
-        ),
-    ],
-    ids=["4e9 triangles", "cut", "empty", "crash", "claims", "format", "nan"],
-)
+NOT_FINITE = struct.pack("<12fH", *[float("nan")] * 12, 0)
+MESHES = {
+    "4e9 triangles": ("stl", binary_stl(2**32 - 1), "cannot be loaded"),
+    "cut": ("stl", binary_stl()[:100], "cannot be loaded"),
+    "empty": ("stl", b"", "cannot be loaded"),
+    "crash": ("ply", CRASHING, "reading it fails"),
+    "claims": ("dae", VALID["dae"].replace(b'count="4"', b'count="99999999999"'), "cannot be load"),
+    "format": ("blend", VALID["stl"], "of no known format"),
+    "nan": ("stl", binary_stl()[:84] + NOT_FINITE * 4, "not finite"),
+}
+
+
+@pytest.mark.parametrize(("suffix", "data", "word"), MESHES.values(), ids=MESHES)
 def test_meshes(suffix: str, data: bytes, word: str, tmp_path: Path) -> None:
     (tmp_path / f"hand.{suffix}").write_bytes(data)
     path = hostile(tmp_path, urdf(collision=mesh(f"hand.{suffix}")))
