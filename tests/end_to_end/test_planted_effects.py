@@ -7,6 +7,7 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from benchmarks.battery.judge import Outcome, judge
+from tests.cli.program import SMOKE, Installed
 
 pytest.importorskip("mujoco")
 
@@ -60,3 +61,24 @@ def test_what_only_comes_near_is_told_as_an_approximation() -> None:
     for each in found.found:  # a wave beside the line comes nearer still, and is no better a name
         assert each["verdict"] == "approximation"
         assert each["approximates"] == "a function of q[panda_joint4]"
+
+
+def test_a_sensor_that_saturates_hides_nothing_else_of_its_joint(excite: Installed) -> None:
+    ratio, level = 0.07, 12.0  # N·m, of 24 that the motions need
+    brief = ("--set", "optimizer.max_iterations=40", "--motions", "3", "--seed", "3")
+    excite.answer("optimize", SMOKE, *brief, "-o", "m.h5")
+    excite.answer(
+        "simulate", SMOKE, "m.h5", "-o", "log.h5", "--seed", "5",
+        "--effect", f"load_dependent_friction@shoulder_pitch={ratio}",
+        "--effect", f"torque_saturation@shoulder_pitch={level}",
+    )  # fmt: skip
+    answer = excite.answer("diagnose", SMOKE, "log.h5", "-o", "found.h5")
+    found = {each["kind"]: each for each in answer["effects"]}
+    assert set(found) == {"load_dependent_friction", "torque_saturation"}
+    assert all(each["joints"] == ["shoulder_pitch"] for each in found.values())
+    sizes = {kind: each["parameters"] for kind, each in found.items()}
+    # A third of the samples is left for it, and the others hold it to its first estimate.
+    told = sizes["load_dependent_friction"]["ratio"]["value"]
+    assert told == pytest.approx(ratio, rel=0.1)
+    assert sizes["torque_saturation"]["level"]["value"] == pytest.approx(level, rel=0.01)
+    assert answer["error"]["after"]["relative_moving"]["shoulder_pitch"] < 0.006

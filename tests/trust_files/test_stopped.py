@@ -13,18 +13,11 @@ import typer
 from excite_cli.cli.app import app
 from excite_cli.cli.ending import run_guarded
 from tests.cli.program import EXCITE, SMOKE, Installed, environment
+from tests.end_to_end.conftest import cache, excite
+
+__all__ = ["cache", "excite"]
 
 LONG = ("optimize", SMOKE, "--motions", "9", "--set", "optimizer.max_iterations=300")
-
-
-@pytest.fixture(scope="module")
-def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("cache")
-
-
-@pytest.fixture
-def excite(tmp_path: Path, cache: Path) -> Installed:
-    return Installed(tmp_path, cache)
 
 
 def test_two_runs_on_one_output_and_a_stop(excite: Installed) -> None:
