@@ -222,15 +222,6 @@ def test_saturated_torque(step: float) -> None:
     assert f"upper limit {level:.6g} N in {share:.1%}" in only(findings, "saturated").text
 
 
-def test_stale_messages_are_masked() -> None:
-    held = np.arange(1600)
-    held[300:304], held[900] = 299, 899
-    run = without_speed(recorded())
-    (back,), findings = check(replace(run, q=run.q[held], tau=run.tau[held]))
-    assert "5 of 1600 samples" in only(findings, "stale").text
-    assert np.flatnonzero(~back.usable()[:, 0]).tolist() == [300, 301, 302, 303, 900]
-
-
 @pytest.mark.parametrize("rate", [500.0, 1000.0])
 def test_stale_messages_are_filled_and_masked_be_they_slow_or_close(rate: float) -> None:
     """One to three repeats of all channels, 3 % of the samples, at any speed of the robot."""
@@ -242,7 +233,9 @@ def test_stale_messages_are_filled_and_masked_be_they_slow_or_close(rate: float)
         stale[at + 1 : at + 1 + length] = True
     held = np.maximum.accumulate(np.where(stale, 0, np.arange(len(run.t))))
     runs, findings = check(replace(run, q=run.q[held], tau=run.tau[held], dq=None))
-    assert only(findings, "stale").severity == "warning"
+    found = only(findings, "stale")
+    assert found.severity == "warning"
+    assert f"{np.sum(stale)} of {len(stale)} samples" in found.text
     assert np.array_equal(runs[0].usable(), np.tile(~stale[:, None], run.tau.shape[1]))
     step = np.abs(np.diff(run.q, axis=0)).max()
     assert np.abs(runs[0].q - run.q).max() < 0.5 * step

@@ -38,6 +38,12 @@ def hostile(folder: Path, text: str) -> Path:
     return path
 
 
+def stl(path: Path, mark: bytes) -> Path:
+    """A good mesh that no other test has."""
+    path.write_bytes(mark + binary_stl()[4:])
+    return path
+
+
 def chain(links: int, kind: str) -> str:
     parts = "".join(link(f"l{k}") for k in range(links))
     joints = "".join(joint(f"j{k}", f"l{k}", f"l{k + 1}", kind) for k in range(links - 1))
@@ -87,21 +93,10 @@ def test_urdf(text: str, word: str, tmp_path: Path) -> None:
     assert word in refused(built, hostile(tmp_path, text))
 
 
-OUTSIDE = "../../../../../../etc/passwd"
-
-
-@pytest.mark.parametrize(
-    ("name", "target"),
-    [
-        *((name, "") for name in (OUTSIDE, "/etc/passwd", "file:///etc/passwd")),
-        (f"package://../{OUTSIDE}", ""),
-        *(("hand.stl", target) for target in ("/etc/passwd", "/dev/zero", "hand.stl", "none")),
-    ],
-)
-def test_paths_and_links_that_leave_the_folder(name: str, target: str, tmp_path: Path) -> None:
-    if target:
-        (tmp_path / "hand.stl").symlink_to(target)
-    message = refused(built, hostile(tmp_path, urdf(collision=mesh(name))))
+@pytest.mark.parametrize("target", ["/etc/passwd", "/dev/zero", "hand.stl", "none"])
+def test_symbolic_links(target: str, tmp_path: Path) -> None:
+    (tmp_path / "hand.stl").symlink_to(target)
+    message = refused(built, hostile(tmp_path, urdf(collision=mesh("hand.stl"))))
     assert "leaves the robot's own folders" in message or "was not found" in message
 
 
@@ -149,8 +144,7 @@ def test_good_meshes_are_read(tmp_path: Path) -> None:
 
 def test_a_slow_mesh_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With no time at all, the process is ended, and says so."""
-    path = tmp_path / "hand.stl"
-    path.write_bytes(binary_stl() + b" slow")
+    path = stl(tmp_path / "hand.stl", b"slow")
     mesh_trial._trial.close()
     monkeypatch.setattr(mesh_trial, "_SLOWEST", 1e-6)
     assert "takes too long" in faults([path], [tmp_path])[path]
@@ -160,18 +154,16 @@ def test_what_lies_in_the_current_folder_is_not_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "json.py").write_text("open('ran', 'w')\nraise SystemExit(3)\n", encoding="utf-8")
-    (tmp_path / "hand.stl").write_bytes(b"here" + binary_stl()[4:])
     mesh_trial._trial.close()
     monkeypatch.chdir(tmp_path)
-    assert not faults([tmp_path / "hand.stl"], [tmp_path])
+    assert not faults([stl(tmp_path / "hand.stl", b"here")], [tmp_path])
     assert not (tmp_path / "ran").exists()
 
 
 def test_after_an_interruption_the_next_answer_is_its_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    good, bad = tmp_path / "good.stl", tmp_path / "bad.stl"
-    good.write_bytes(b"good" + binary_stl()[4:])
+    good, bad = stl(tmp_path / "good.stl", b"good"), tmp_path / "bad.stl"
     bad.write_bytes(binary_stl()[:100] + b"bad")
     assert not faults([good], [tmp_path])
     process = mesh_trial._trial._process
@@ -192,8 +184,7 @@ def test_after_an_interruption_the_next_answer_is_its_own(
 @pytest.mark.skipif(not Path("/proc/self/limits").exists(), reason="Linux tells the limits so")
 def test_what_is_loaded_already_does_not_count_to_the_memory_of_meshes(tmp_path: Path) -> None:
     """Threads of linear algebra reserve tens of MiB each: as many as there are cores."""
-    (tmp_path / "hand.stl").write_bytes(b"room" + binary_stl()[4:])
-    assert not faults([tmp_path / "hand.stl"], [tmp_path])
+    assert not faults([stl(tmp_path / "hand.stl", b"room")], [tmp_path])
     process = mesh_trial._trial._process
     assert process is not None
     limits = Path(f"/proc/{process.pid}/limits").read_text(encoding="ascii")
@@ -205,7 +196,7 @@ def test_what_is_loaded_already_does_not_count_to_the_memory_of_meshes(tmp_path:
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="Linux tells the peak so")
 def test_a_script_with_a_large_array_can_read_meshes(tmp_path: Path) -> None:
     """A process begins with the peak memory of the one that started it, by one of two counts."""
-    (tmp_path / "palm.stl").write_bytes(b"room" + binary_stl()[4:])
+    stl(tmp_path / "palm.stl", b"room")
     script = (
         "import sys\n"
         "from pathlib import Path\n"

@@ -111,26 +111,18 @@ def test_folders_that_hold_inputs(tmp_path: Path) -> None:
     refuse_inputs_as_outputs({"output": bag / "new.h5", "none": None}, (log, bag))
 
 
-def test_the_library_refuses_too(folder: Path) -> None:
-    config, urdf, result, fit = (
-        folder / name for name in ("arm.yaml", "arm.urdf", "result.h5", "fit.h5")
-    )
-    problem = api.load_problem(config, ["optimizer.max_iterations=1", FIT])
-    case = api.load_case(config)
-    data = api.load_data(problem, folder / "data.h5")
-    following = api.plan_after(case, folder / "diagnosis.h5")
+def test_functions_that_no_command_calls_so_refuse_too(folder: Path) -> None:
+    case = api.load_case(folder / "arm.yaml")
+    data = api.load_data(case, folder / "data.h5")
     found, fitted = api.read_diagnosis(folder / "diagnosis.h5"), api.identify(case, data)
+    urdf = folder / "arm.urdf"
     calls: list[Callable[[], object]] = [
-        lambda: api.plan(problem, output=urdf, overwrite=True),
-        lambda: api.plan(problem, output=config, overwrite=True),
-        lambda: api.plan(following, output=config, overwrite=True),
-        lambda: api.diagnose(case, data, apply=config, overwrite=True),
-        lambda: api.simulate(case, result, output=config, overwrite=True),
-        lambda: api.plan(problem, output=str(fit), overwrite=True),
-        lambda: api.plan(problem, priors=[result], output=result, overwrite=True),
-        lambda: api.diagnose(problem, data, output=folder / "data.h5"),
-        lambda: api.save_config(urdf, problem, found),
-        lambda: api.save_fit(urdf, problem, fitted),
+        lambda: api.simulate(
+            case, folder / "result.h5", output=folder / "arm.yaml", overwrite=True
+        ),
+        lambda: api.write_dataset(folder / "data.h5", data, {}),
+        lambda: api.save_config(urdf, case, found),
+        lambda: api.save_fit(urdf, case, fitted),
     ]
     before = contents(folder)
     for call in calls:

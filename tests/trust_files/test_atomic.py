@@ -14,6 +14,7 @@ from excite_cli.atomic import write_atomically, write_folder_atomically
 from excite_cli.disk_cache import store_arrays, stored_arrays
 from excite_cli.errors import FileError
 from excite_cli.export.motions import MOTION_EXPORTERS
+from excite_cli.measurement.hdf5_writer import new_hdf5
 from excite_cli.measurement.timed_motion import TimedMotion
 
 WRITERS = pytest.mark.parametrize("write", [write_atomically, write_folder_atomically])
@@ -132,3 +133,9 @@ def test_a_bag_that_fills_the_disk_is_told_as_any_file(
     with pytest.raises(FileError, match="bag cannot be written: no space is left on the disk"):
         MOTION_EXPORTERS["rosbag2"].write(tmp_path / "bag", motion)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_fails_once_for_an_hdf5_file(capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(OSError, match="No space left"), new_hdf5(Path("/dev/full")) as file:
+        file["zeros"] = [0.0] * 1000
+    assert capfd.readouterr().err == ""
