@@ -114,6 +114,7 @@ def began(name: str, epoch: float | None = None, first: float = 0.0, part: Part 
             ([began("a", NOON), began("b", epoch), began("c", NOON + 900.0)], [0.0, 10.0, 20.0])
             for epoch in (None, NOON, NOON + 8.0)
         ),
+        ([began("a", first=5.0), began("b", first=1.0)], [-5.0, 9.0]),
         # Clocks that are set while they run may cross a little.
         ([began("a", NOON), began("b", NOON + 9.5)], [0.0, 9.5]),
         # Stretches of a recording share its beginning.

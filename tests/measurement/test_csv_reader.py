@@ -130,7 +130,7 @@ def test_no_time_stamps(log: Path) -> None:
         ("t,,tau_1\n0,1,2\n", ("a column has no name",)),
         ("t,q_1,tau_1\n0,1,2\n1,2\n2,3,4\n", ("line 3", "2 fields", "3 columns")),
         ("t,q_1,tau_1\n0,1,2\n1,x7,3\n", ("line 3", "'x7' in column 'q_1'")),
-        ("t,q_1,tau_1\n" + "1" * 2**21, ("MiB",)),
+        ("t,q_1,tau_1\n" + "1" * 2**21, ("a line of more than", "MiB")),
         ("Joint_1,Joint_2\n0.1,0.2\n0.1,0.3\n",
          ("its columns: Joint_1, Joint_2", "t, q_<joint>", "joined")),
         (b"\xff\xfe\x00t", ("a header and no rows",)),
