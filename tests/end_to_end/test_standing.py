@@ -187,24 +187,6 @@ def test_a_weighed_robot_changes_nothing_of_what_is_found(
         assert abs(told["value"] - size) < 3.0 * told["std"] + 0.02 * size
 
 
-def test_rows_of_the_base_need_a_wrench_in_the_data(
-    excite: Installed, tmp_path: Path, folder: Path, record: Recording
-) -> None:
-    config = record("base.yaml")
-    with h5py.File(tmp_path / "log.h5", "a") as file:
-        for run in file["runs"].values():
-            del run["left_sole"], run["tau"]  # torques are not missed
-    for command, name, parts in (
-        ("identify", config, ("no channel 'left_sole'", "measurement.wrench")),
-        ("diagnose", config, ("no channel 'left_sole'", "measurement.wrench")),
-        ("identify", str(folder / "both.yaml"), ("has no dataset 'tau'",)),
-    ):
-        run = excite(command, name, "log.h5")
-        assert run.returncode == 2
-        for part in parts:
-            assert part in run.stderr
-
-
 def test_the_loop_goes_on(excite: Installed, folder: Path, record: Recording) -> None:
     """Diagnosed, applied, scored; the next motion is planned on top of the data."""
     first, applied = record("base.yaml", *TILT), str(folder / "applied.yaml")

@@ -8,7 +8,9 @@ import h5py
 import numpy as np
 import pytest
 
+from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import FileError
+from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.foreign_hdf5 import attribute
 from excite_cli.measurement.hdf5_writer import write_dataset
@@ -85,6 +87,14 @@ def test_wrong_contents(tmp_path: Path) -> None:
         _replace(path, name, value)
         refused(path, *parts)
     np.testing.assert_allclose(read(path, rate=200.0).runs[0].t, recorded().t)
+
+
+def test_torques_are_not_missed_where_only_the_base_has_rows(tmp_path: Path) -> None:
+    path = flat(tmp_path / "a.h5")
+    _replace(path, "tau", None)
+    (run,) = read_dataset([path], MeasurementSpec(), JOINTS, rows=("base",)).runs
+    np.testing.assert_array_equal(run.q, recorded().q)
+    assert not run.usable().any()
 
 
 @pytest.mark.parametrize(
