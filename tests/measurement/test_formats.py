@@ -157,7 +157,6 @@ def test_a_wrong_file_of_matlab_7_3_gets_one_sentence(tmp_path: Path) -> None:
     ("name", "content", "words"),
     [
         ("log.mat", b"no such thing", "is no readable MATLAB file"),
-        ("log.csv", b"sep=;\nt;q_base\n", "has a header and no rows"),
         ("log.csv", b"t,q_base\n\0\x81\xfe\n", "log.csv"),
     ],
 )

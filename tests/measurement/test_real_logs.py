@@ -1,6 +1,5 @@
 """Logs of real robots: no error is found in them, and what is known of them comes out."""
 
-import gzip
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +8,6 @@ import numpy as np
 import pytest
 
 from excite_cli.api.loading import as_recorded, load_case
-from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.quality import raise_for_errors
 from excite_cli.measurement.speed_lag import speed_lag
@@ -27,7 +25,7 @@ def of(robot: str, key: str) -> list[Any]:
         return list(file.attrs[key])
 
 
-def load(robot: str, name: str | Path = "", **declared: Any) -> Dataset:
+def load(robot: str, name: str = "", **declared: Any) -> Dataset:
     file, urdf = ROBOTS[robot]
     spec = {"robot": {"urdf": str(LOGS / robot / urdf)}, "measurement": declared}
     return as_recorded(load_case(spec), LOGS / robot / (name or file))
@@ -54,11 +52,14 @@ def ratios(robot: str) -> dict[str, float]:
     return dict(zip(names, map(float, of(robot, "gear_ratios")), strict=True))
 
 
-# As the motors of the TX40 are: with encoders, and the wrist's coupled.
-TX40 = {"torque": "motor", "position": "motor", "coupling": {"joint_5": {"joint_6": 1.0}}}
 AT_MOTORS: dict[str, dict[str, Any]] = {
     "kr300": {"torque": "motor", "channels": {"tau": "tau_motor"}},
-    "tx40": {**TX40, "channels": {"tau": "tau_motor", "q": "q_motor"}},
+    "tx40": {  # with encoders, and the wrist's coupled
+        "torque": "motor",
+        "position": "motor",
+        "coupling": {"joint_5": {"joint_6": 1.0}},
+        "channels": {"tau": "tau_motor", "q": "q_motor"},
+    },
 }
 
 
@@ -79,24 +80,3 @@ def test_bag_and_hdf5_of_the_same_recording() -> None:
     assert known.dq is not None
     np.testing.assert_allclose(bag.dq, known.dq, rtol=1e-6, atol=1e-7)  # stored in single
     np.testing.assert_allclose(bag.tau, known.tau, rtol=1e-6, atol=1e-5)
-
-
-def test_motor_side_tables_say_what_they_need(tmp_path: Path) -> None:
-    with pytest.raises(
-        FileError, match=r"its columns: Joint_1, .*joined with those of the other files"
-    ):
-        load("tx40", "curr_data.csv.gz")
-    # Joined, as the message says: columns with their channel's name, and the rate declared.
-    tables = [
-        gzip.decompress((LOGS / "tx40" / name).read_bytes()).decode().splitlines()[:5001]
-        for name in ("pos_read_data.csv.gz", "curr_data.csv.gz")
-    ]
-    header = ",".join(f"{c}_{j}" for c in ("q", "tau") for j in range(1, 7))
-    rows = [",".join(pair) for pair in zip(tables[0][1:], tables[1][1:], strict=True)]
-    path = tmp_path / "joined.csv"
-    path.write_text("\n".join([header, *rows]))
-    data = load("tx40", path, rate=5000, gear_ratio=ratios("tx40"), **TX40)
-    assert [found.severity for found in data.findings] == ["note"], data.findings
-    joined, known = data.runs[0], load("tx40").runs[0]
-    same = joined.q[::5] - joined.q[0], known.q[:1000] - known.q[0]
-    assert np.abs(same[0] - same[1]).max() < 5e-3

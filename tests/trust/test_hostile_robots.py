@@ -81,7 +81,13 @@ HOSTILE = {
     "nan": (urdf().replace('xyz="0 0 0.5"', 'xyz="0 nan 0"', 1), "not three numbers"),
     "axis": (urdf().replace('xyz="0 1 0"', 'xyz="1e308 1e308 0"', 1), "has the axis"),
     "turn": (urdf().replace("<origin ", '<origin rpy="inf 0 0" ', 1), "<origin rpy"),
-    "mass": (urdf().replace('mass value="1"', 'mass value="-1"', 1), "a mass not negative"),
+    **{
+        f"mass {each}": (
+            urdf().replace('mass value="1"', f'mass value="{each}"', 1),
+            "a mass not negative",
+        )
+        for each in ("-1", "nan", "1e300", "heavy")
+    },
     "inertia": (urdf().replace('ixx="0.1"', 'ixx="nan"', 1), "finite numbers"),
     "radius": (urdf().replace('radius="0.05"', 'radius="-1"', 1), "not a number"),
     "island": (beside(ISLAND), "go round in a circle"),
