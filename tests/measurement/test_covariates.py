@@ -10,6 +10,7 @@ from excite_cli.errors import ConfigError, FileError
 from excite_cli.measurement.covariates import with_declared
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.hdf5_writer import write_dataset
+from excite_cli.measurement.missing_values import rows_of
 from tests.measurement.recordings import JOINTS, check, only, read, recorded, write_csv
 
 WARM = "temp_elbow"
@@ -99,22 +100,13 @@ def test_long_times_without_a_value_are_told_and_none_at_all_is_an_error() -> No
 
 def test_columns_follow_the_run_through_gaps_jitter_and_lost_rows() -> None:
     run = recorded(8.0)
-    rng = np.random.default_rng(0)
-    jittered = replace(run, t=run.t + rng.uniform(-2e-4, 2e-4, len(run.t)))
-    kept = np.ones(len(run.t), bool)
-    kept[700:900] = False  # a gap of a second
-    position = run.q.copy()
-    position[300, 1] = np.nan
-    gappy = replace(
-        jittered, t=jittered.t[kept], q=position[kept], tau=run.tau[kept], dq=None,
-        covariates={WARM: (20.0 + 3.0 * jittered.t)[kept]},
-    )  # fmt: skip
-    parts, _ = check(gappy)
+    t = run.t + np.random.default_rng(0).uniform(-2e-4, 2e-4, len(run.t))
+    jittered = replace(run, t=t, dq=None, covariates={WARM: 20.0 + 3.0 * t}, q=run.q.copy())
+    jittered.q[300, 1] = np.nan
+    parts, _ = check(rows_of(jittered, (run.t < 3.5) | (run.t >= 4.5)))
     assert len(parts) == 2
-    for part in parts:
+    for part in (*parts, parts[0].cut(100, 200)):
         assert part.covariates[WARM] == pytest.approx(20.0 + 3.0 * part.t, abs=1e-9)
-    half = parts[0].cut(100, 200)
-    assert half.covariates[WARM] == pytest.approx(20.0 + 3.0 * half.t, abs=1e-9)
 
 
 def test_data_at_hand_give_their_channels_for_columns() -> None:
