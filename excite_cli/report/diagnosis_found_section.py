@@ -26,7 +26,7 @@ from excite_cli.report.page import Block, Section, Table, Text
 _COLUMNS = (
     "effect",
     "where",
-    "size ± standard deviation",
+    "size ± std",
     "p",
     "share",
     "gain",
@@ -48,10 +48,10 @@ def found_section(found: Diagnosis) -> Section:
                 title="What the declared model lacks",
                 right=frozenset({3, 4, 5}),
                 note=(
-                    "reduction: Shapley share of the error reduction on held-out data, averaged "
-                    "over orders of joining, so that all rows add up to it; gain: by which the "
-                    "error on runs left out falls; held-out: whether the effect lowers the error "
-                    "on held-out data beside all others, and the change there in percentage points."
+                    "share: part of the fall of the mean held-out error (Shapley value: averaged over "
+                    "orders of joining, so that all rows add up to it); gain: by which the error on "
+                    "training data left out falls; held-out, without it: the verdict, and by how "
+                    "much the error of the most affected joint rises if the effect is left out."
                 ),
             )
         )

@@ -93,9 +93,8 @@ def thresholds_of(
     seconds = sum(len(run.residual) * run.step for run in runs)
     if seconds < _FEWEST:
         raise ConfigError(
-            f"thresholds: {seconds:.0f} s of usable data (ends of recordings are cut) are too few for "
-            "a rate per hour. "
-            f"Give at least {_FEWEST} s, better some minutes."
+            f"thresholds: {seconds:.0f} s of usable data (ends are cut) are too few for a rate per "
+            f"hour. Give at least {_FEWEST} s, better some minutes."
         )
     smooth = [low_pass(run.residual, run.step, time_constant) for run in runs]
     n = len(joint_names)

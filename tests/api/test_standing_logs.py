@@ -21,7 +21,7 @@ from excite_cli.api.motions import is_motion
 from excite_cli.measurement.dataset import Run
 from excite_cli.trajectory.fourier import FourierTrajectory
 from tests.api.conftest import SMOKE
-from tests.measurement.standing_bags import IMU, WRENCH, States, Topic, write_standing
+from tests.measurement.bags import IMU, WRENCH, States, Topic, write_standing
 
 pytest.importorskip("mujoco")
 

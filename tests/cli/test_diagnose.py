@@ -189,7 +189,6 @@ def test_overwrite_replaces(outcome: Outcome, excite: Program) -> None:
         ),
         (("--apply", "there"), "there exists already"),
         (("--apply-unconfirmed",), "--apply-unconfirmed says nothing without --apply"),
-        (("--smallest",), "--smallest says nothing without --apply"),
     ],
 )
 def test_bad_requests_get_one_message(

@@ -192,8 +192,8 @@ def test_a_gap_and_missing_values_are_warned_of_and_the_diagnosis_is_right(
 
 def test_a_bag_cut_short(excite: Program, config: Path) -> None:
     pytest.importorskip("rosbags")
+    from tests.measurement.bags import write_bag
     from tests.measurement.recordings import recorded as short
-    from tests.measurement.test_bag_reader import write_bag
 
     bag = write_bag(excite.folder / "bag", short())
     data = next(bag.glob("*.db3"))

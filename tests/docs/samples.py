@@ -2,7 +2,7 @@
 
 import os
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,14 +16,15 @@ from excite_cli import (
     load_data,
     load_problem,
     plan,
+    read_result,
     save_fit,
     simulate,
     write_dataset,
 )
-from excite_cli.robot.model import Array
 from excite_cli.simulation.settings import SimulationSettings
+from tests.cli.program import ROOT
+from tests.measurement.recordings import named, write_table
 
-ROOT = Path(__file__).resolve().parents[2]
 _STANDING = "  base: floating\n  rows: [base]\n"
 _SENSORS = """
 measurement:
@@ -83,8 +84,6 @@ class Samples:
         plan(load_problem(self._folder / "arm.yaml", _PLANNING), output=path)
 
     def _measured(self, path: Path) -> None:
-        from excite_cli import read_result
-
         motions = read_result(self._made("arm.h5", self._motions))
         settings = SimulationSettings(rate=200.0)
         recording = simulate(self._case(), motions, ["coulomb_friction@elbow=1.5"], settings)
@@ -97,29 +96,14 @@ class Samples:
         _write_csv(path, self._data(), 180 / np.pi, 1e3)
 
     def _bag(self, path: Path) -> None:
-        from rosbags.rosbag2 import Writer
-        from rosbags.typesys import Stores, get_typestore
+        from tests.measurement.bags import States, write_standing
 
-        store = get_typestore(Stores.ROS2_HUMBLE)
-        kind = "sensor_msgs/msg/JointState"
-        state, header, stamp = (
-            store.types[name]
-            for name in (kind, "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
-        )
         data = self._data()
-        run, names = data.runs[0], list(data.joint_names)
-        with Writer(path, version=9) as writer:
-            connection = writer.add_connection("/joint_states", kind, typestore=store)
-            for t, q, tau in zip(run.t, run.q, run.tau, strict=True):
-                at = 1_700_000_000_000_000_000 + round(1e9 * float(t))
-                when = header(stamp=stamp(sec=at // 10**9, nanosec=at % 10**9), frame_id="")
-                message = state(header=when, name=names, position=q, velocity=0 * q, effort=tau)
-                writer.write(connection, at, store.serialize_cdr(message, kind))
+        run = data.runs[0]
+        write_standing(path, States(data.joint_names, run.t, run.q, run.tau), {})
 
     def _standing(self) -> Dataset:
         """The arm on one foot, with an inertial unit."""
-        from excite_cli import read_result
-
         self._made("arm.urdf", _urdf)
         case = load_case(self._made("standing.yaml", _standing_config))
         motions = read_result(self._made("arm.h5", self._motions))
@@ -127,22 +111,20 @@ class Samples:
 
     def _standing_positions(self, path: Path) -> None:
         data = self._standing()
-        run, names = data.runs[0], [f"q_{name}" for name in data.joint_names]
-        _write_table(path, {"t": run.t, **dict(zip(names, run.q.T, strict=True))})
+        run = data.runs[0]
+        write_table(path, {"t": run.t, **named("q", run.q, data.joint_names)})
 
     def _standing_foot(self, path: Path) -> None:
         run = self._standing().runs[0]
         both = {"foot_wrench": ("fx", "fy", "fz", "mx", "my", "mz"),
                 "imu": ("wx", "wy", "wz", "ax", "ay", "az")}  # fmt: skip
-        columns = {
-            f"{channel}_{part}": run.extra[channel][:, k]
-            for channel, parts in both.items()
-            for k, part in enumerate(parts)
-        }
-        _write_table(path, {"t": run.t, **columns})
+        columns = {"t": run.t}
+        for channel, parts in both.items():
+            columns |= named(channel, run.extra[channel], parts)
+        write_table(path, columns)
 
     def _standing_bag(self, path: Path) -> None:
-        from tests.measurement.standing_bags import IMU, WRENCH, States, Topic, write_standing
+        from tests.measurement.bags import IMU, WRENCH, States, Topic, write_standing
 
         data = self._standing()
         run = data.runs[0]
@@ -175,16 +157,9 @@ def _standing_config(path: Path) -> None:
     path.write_text(text + _SENSORS, "utf-8")
 
 
-def _write_table(path: Path, columns: Mapping[str, Array]) -> None:
-    table = np.column_stack(list(columns.values()))
-    np.savetxt(path, table, "%.17g", delimiter=",", header=",".join(columns), comments="")
-
-
 def _write_csv(path: Path, data: Dataset, angle: float, time: float) -> None:
     run, names = data.runs[0], data.joint_names
     sliding = np.array([name == "slide" for name in names])
     q = run.q * np.where(sliding, 1.0, angle)
-    columns = {"t": run.t * time}
-    columns |= {f"q_{name}": q[:, k] for k, name in enumerate(names)}
-    columns |= {f"tau_{name}": run.tau[:, k] for k, name in enumerate(names)}
-    _write_table(path, columns)
+    columns = {"t": run.t * time, **named("q", q, names), **named("tau", run.tau, names)}
+    write_table(path, columns)

@@ -14,10 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.program import environment
+from tests.cli.program import ROOT, Program, environment
 from tests.docs.console import Command, Page, read_page, words_of
-from tests.docs.preloaded import Done, Preloaded
-from tests.docs.samples import ROOT, Samples
+from tests.docs.samples import Samples
 
 _BRIEF = ("--set", "optimizer.max_iterations=3", "--set", "optimizer.restarts=1")
 SHORTER: dict[str, tuple[str, ...]] = {
@@ -47,7 +46,6 @@ class Shared:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._cache = folder / "cache"
-        self._preloaded = Preloaded(environment(self._cache), folder)
         self._written: dict[str, Path] = {}
 
     def run(self, command: Command, folder: Path) -> None:
@@ -58,20 +56,18 @@ class Shared:
             shutil.copytree(self._written[key], folder, dirs_exist_ok=True)
             return
         done = self._done(command, folder)
-        told = f"{command.line}\n(line {command.number}) ended with {done.status}, not "
-        assert done.status == command.status, f"{told}{command.status}:\n{done.stderr[-2000:]}"
+        told = f"{command.line}\n(line {command.number}) ended with {done.returncode}, not "
+        assert done.returncode == command.status, f"{told}{command.status}:\n{done.stderr[-2000:]}"
         self._keep(key, before, folder)
 
-    def _done(self, command: Command, folder: Path) -> Done:
+    def _done(self, command: Command, folder: Path) -> subprocess.CompletedProcess[str]:
         line = shortened(command.line)
         words = words_of(line)
         if words[0] == "excite" and not SHELL & set(command.line):
-            return self._preloaded(words[1:], folder)
+            return Program(folder, self._cache)(*words[1:])
         programs = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', os.defpath)}"
-        run = subprocess.run(
-            line,
-            shell=True,
-            executable="/bin/bash",
+        return subprocess.run(
+            ["/bin/bash", "-c", line],
             cwd=folder,
             env={**environment(self._cache), "PATH": programs},
             capture_output=True,
@@ -80,7 +76,6 @@ class Shared:
             timeout=180,
             check=False,
         )
-        return Done(run.returncode, run.stderr)
 
     def _keep(self, key: str, before: dict[str, str], folder: Path) -> None:
         """Keep the files that are new or others than before."""
@@ -94,7 +89,7 @@ class Shared:
 
 
 def shortened(line: str) -> str:
-    """The command with options that make it quick, before any redirection or `&`."""
+    """The command with options that make it quick."""
     line = line.partition("  #")[0]
     words = words_of(line)
     if "excite" not in words:
@@ -108,16 +103,10 @@ def shortened(line: str) -> str:
         more = (*more, *WITHOUT_MESHES)
     if not more:
         return line
-    head, word, tail = line.partition(f"excite {command} ")
-    options, mark, rest = _before_shell(tail)
-    return f"{head}{word}{options} {shlex.join(more)}{mark}{rest}"
-
-
-def _before_shell(text: str) -> tuple[str, str, str]:
-    for mark in (" & ", " | ", " > "):
-        if mark in text:
-            return text.partition(mark)
-    return text, "", ""
+    # Before what a shell does with the command.
+    ends = [line.index(mark) for mark in (" & ", " | ", " > ") if mark in line]
+    end = min(ends, default=len(line))
+    return f"{line[:end]} {shlex.join(more)}{line[end:]}"
 
 
 def _contents(folder: Path) -> dict[str, str]:
@@ -181,12 +170,3 @@ def test_a_page_is_read_as_it_is_written(tmp_path: Path) -> None:
         ("excite check a.yaml b.h5  # why", 0),
         ("excite robots", 1),
     ]
-
-
-def test_shortening_leaves_the_shell_alone() -> None:
-    assert shortened("excite robots > x.txt") == "excite robots > x.txt"
-    check = shortened("excite check talos.yaml a.h5  # why")
-    assert check == f"excite check talos.yaml a.h5 --rate 50 {shlex.join(WITHOUT_MESHES)}"
-    line = shortened("for s in 1 2; do excite optimize a.yaml -o $s.h5 & done; wait")
-    assert f"a.yaml -o $s.h5 {shlex.join(SHORTER['optimize'])} & done" in line
-    assert line.endswith("& done; wait")

@@ -8,7 +8,6 @@ import pytest
 
 from docs import make_commands, make_configuration
 from docs.make_configuration import slug
-from excite_cli.cli.app import app
 from excite_cli.config.spec import Spec
 from excite_cli.effects.catalogue import catalogue
 
@@ -39,12 +38,6 @@ def test_every_key_is_explained_once() -> None:
     definitions = Spec.model_json_schema()["$defs"]
     named = {name for schema in definitions.values() for name in schema.get("properties", ())}
     assert named <= {name for name, _, _ in keys}
-
-
-def test_every_command_has_its_page() -> None:
-    page = make_commands.commands()
-    for command in app.registered_commands:
-        assert f"\n## {command.name}\n" in page
 
 
 def test_every_effect_is_in_the_catalogue_page() -> None:

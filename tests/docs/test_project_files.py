@@ -9,16 +9,16 @@ from typing import Any
 
 import pytest
 import yaml
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from excite_cli import __version__
+from tests.cli.program import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
-FORMS = [
-    p for p in sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml")) if p.stem != "config"
-]
+PINNED = ROOT / "requirements" / "ci.txt"
 # Packages that messages tell to install and that are none of the program's own needs.
 OTHERS = {"robot_descriptions", "ur_rtde"}
 # Modules that a workflow installs itself or that are of the tools of development.
@@ -119,12 +119,15 @@ def test_pythons_agree() -> None:
     assert PROJECT["project"]["requires-python"] == f">={pythons[0]}"
 
 
-def test_there_is_one_version() -> None:
+def test_there_is_one_version_and_one_home() -> None:
     assert "version" in PROJECT["project"]["dynamic"]
     assert PROJECT["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "excite_cli.__version__"}
-    assert loaded(ROOT / "CITATION.cff")["version"] == __version__
-    assert RECIPE["context"]["version"] == __version__
+    cited, urls = loaded(ROOT / "CITATION.cff"), PROJECT["project"]["urls"]
+    assert cited["version"] == RECIPE["context"]["version"] == __version__
     assert f"\n## {__version__}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert all(url.startswith(urls["Homepage"]) for url in urls.values())
+    assert cited["repository-code"] == urls["Homepage"]
+    assert f"git clone {urls['Homepage']}\n" in CONTRIBUTING
 
 
 def test_the_recipe_of_conda_asks_for_the_same() -> None:
@@ -143,16 +146,6 @@ def test_there_is_one_home() -> None:
     assert all(url.startswith(home) for url in PROJECT["project"]["urls"].values())
     assert loaded(ROOT / "CITATION.cff")["repository-code"] == home
     assert f"git clone {home}\n" in CONTRIBUTING
-
-
-@pytest.mark.parametrize("path", FORMS, ids=lambda path: path.stem)
-def test_issue_forms_ask(path: Path) -> None:
-    form = loaded(path)
-    assert form["name"]
-    assert form["description"]
-    asked = [part["id"] for part in form["body"]]
-    assert len(set(asked)) == len(asked) >= 2
-    assert any(part.get("validations", {}).get("required") for part in form["body"])
 
 
 def test_hooks_are_the_tools_of_lint() -> None:
@@ -189,30 +182,47 @@ def told_in(path: Path) -> list[str]:
 def test_what_messages_say_to_install_is_there() -> None:
     """The package by its name at pip, quoted for a shell, with an extra that has the library."""
     extras, name = PROJECT["project"]["optional-dependencies"], PROJECT["project"]["name"]
-    required = OTHERS | {
-        re.split(r"[^\w-]", each)[0] for each in PROJECT["project"]["dependencies"]
-    }
+    plain = {re.split(r"[^\w-]", each)[0] for each in PROJECT["project"]["dependencies"]}
+    plain |= OTHERS | {"."}
     pages = [*(ROOT / "docs").rglob("*.md"), ROOT / "README.md", ROOT / "CHANGELOG.md"]
     seen = set()
     for path in (*(ROOT / "excite_cli").rglob("*.py"), *pages):
-        for text in told_in(path):
-            for asked in installs(text):
-                if (
-                    asked in required
-                    or asked.startswith(("figaroh", "'mujoco[sysid]'", "-"))
-                    or asked == "."
-                ):
-                    continue
-                found = re.fullmatch(rf"'{name}\[(\w+)\]'", asked)
-                assert found is not None, f"{path.relative_to(ROOT)}: pip install {asked}"
-                own = {re.split(r"[^\w-]", each)[0] for each in extras[found[1]]}
-                source = path.read_text(encoding="utf-8").lower()
-                if path.suffix == ".py":
-                    assert any(each in source for each in own), f"{path.name}: {found[1]}"
-                seen.add(found[1])
+        for asked in (asked for text in told_in(path) for asked in installs(text)):
+            if asked in plain or asked.startswith(("figaroh", "'mujoco[sysid]'", "-")):
+                continue
+            found = re.fullmatch(rf"'{name}\[(\w+)\]'", asked)
+            assert found is not None, f"{path.relative_to(ROOT)}: pip install {asked}"
+            own = {re.split(r"[^\w-]", each)[0] for each in extras[found[1]]}
+            source = path.read_text(encoding="utf-8").lower()
+            if path.suffix == ".py":
+                assert any(each in source for each in own), f"{path.name}: {found[1]}"
+            seen.add(found[1])
     assert {"plot", "bags", "parquet", "view", "sim", "cluster", "formats"} <= seen
 
 
-def test_the_command_and_the_module_have_the_names_that_are_told() -> None:
-    assert PROJECT["project"]["scripts"] == {"excite": "excite_cli.cli.app:main"}
-    assert (ROOT / "excite_cli" / "__main__.py").is_file()
+def pins() -> dict[str, list[Requirement]]:
+    """Pinned requirements by name, each with its hash; one with markers may have versions."""
+    found: dict[str, list[Requirement]] = {}
+    text = re.sub(r"\s*\\\n\s*", " ", PINNED.read_text(encoding="utf-8"))
+    for line in re.findall(r"^[^\s#].*", text, re.MULTILINE):
+        assert " --hash=sha256:" in line, f"no hash: {line}"
+        each = Requirement(line.split(" --hash")[0])
+        found.setdefault(canonicalize_name(each.name), []).append(each)
+    return found
+
+
+def test_every_dependency_is_pinned_within_its_range() -> None:
+    """Of the program, of its extras and of what builds it."""
+    project, again = PROJECT["project"], f"{PINNED.name} is out of date: run `make lock`"
+    asked = [*project["dependencies"], *PROJECT["build-system"]["requires"]]
+    asked += [text for extra in project["optional-dependencies"].values() for text in extra]
+    pinned = pins()
+    for wanted in map(Requirement, asked):
+        name = canonicalize_name(wanted.name)
+        if name == project["name"]:
+            continue
+        assert name in pinned, f"{name} is not pinned: {again}"
+        for each in pinned[name]:
+            (exact,) = each.specifier
+            assert exact.operator == "=="
+            assert wanted.specifier.contains(exact.version, prereleases=True), f"{wanted}: {again}"

@@ -10,7 +10,6 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass, replace
-from enum import Enum
 from functools import wraps
 from importlib import import_module
 from pathlib import Path
@@ -49,11 +48,9 @@ WORDS = ("in_words", "label", "sentence")
 
 def junk(value: Any) -> Any:
     """The same with every text replaced."""
-    if isinstance(value, str):
-        return JUNK
     if isinstance(value, tuple | list):
         return type(value)(map(junk, value))
-    return value
+    return JUNK if isinstance(value, str) else value
 
 
 def speechless(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -80,64 +77,63 @@ def without_words() -> Iterator[int]:
     """Every text replaced; how many places were."""
     count = 0
     with pytest.MonkeyPatch.context() as patch:
+
+        def put(place: Any, name: str, value: Any) -> None:
+            nonlocal count
+            count += 1
+            patch.setattr(place, name, value)
+
         modules = [m for name, m in sys.modules.items() if name.startswith("excite_cli") and m]
         for module in modules:
             for name, value in list(vars(module).items()):
                 if puts_into_words(value):
-                    patch.setattr(module, name, speechless(value))
-                    count += 1
+                    put(module, name, speechless(value))
                 if not (inspect.isclass(value) and value.__module__ == module.__name__):
                     continue
                 for attribute in set(WORDS) & set(vars(value)):
                     told = vars(value)[attribute]
                     if isinstance(told, property):
                         assert told.fget is not None
-                        patch.setattr(value, attribute, property(speechless(told.fget)))
-                        count += 1
+                        put(value, attribute, property(speechless(told.fget)))
                     elif isinstance(told, FunctionType):
-                        patch.setattr(value, attribute, speechless(told))
-                        count += 1
+                        put(value, attribute, speechless(told))
         for kind in catalogue().values():
-            patch.setattr(kind, "title", JUNK)
-            patch.setattr(kind, "signature", JUNK)
-            count += 2
+            put(kind, "title", JUNK)
+            put(kind, "signature", JUNK)
         made = Finding.__init__
 
         def silent(
-            self: Finding, kind: str, severity: Any, text: str, *rest: Any, **more: Any
+            finding: Finding, kind: str, how: Any, text: str, *rest: Any, **more: Any
         ) -> None:
-            made(self, kind, severity, JUNK, *rest, **more)
+            made(finding, kind, how, JUNK, *rest, **more)
 
         patch.setattr(Finding, "__init__", silent)
         yield count
+
+
+def parts(value: Any) -> dict[Any, Any] | None:
+    """What a record is made of, prose left out; None of a single value."""
+    if is_dataclass(value) and not isinstance(value, type):
+        value = {f.name: getattr(value, f.name) for f in fields(value)}
+    elif isinstance(value, tuple | list):
+        value = dict(enumerate(value))
+    if not isinstance(value, dict):
+        return None
+    return {name: each for name, each in value.items() if name not in PROSE | FREE}
 
 
 def differences(one: Any, other: Any, where: str = "") -> list[str]:
     """Where two records differ in what is no prose."""
     if type(one) is not type(other):
         return [f"{where}: {type(one)} {type(other)}"]
-    if is_dataclass(one) and not isinstance(one, type):
-        names = [f.name for f in fields(one) if f.name not in PROSE | FREE]
-        return differences(
-            {name: getattr(one, name) for name in names},
-            {name: getattr(other, name) for name in names},
-            where,
-        )
-    if isinstance(one, dict):
-        if set(one) != set(other):
-            return [f"{where}: {set(one) ^ set(other)}"]
-        return [d for k in one if k not in PROSE | FREE
-                for d in differences(one[k], other[k], f"{where}[{k}]")]  # fmt: skip
-    if isinstance(one, tuple | list):
-        if len(one) != len(other):
-            return [f"{where}: {len(one)} {len(other)}"]
-        pairs = enumerate(zip(one, other, strict=True))
-        return [d for i, (a, b) in pairs for d in differences(a, b, f"{where}[{i}]")]
+    inside, beside = parts(one), parts(other)
+    if inside is not None and beside is not None:
+        if set(inside) != set(beside):
+            return [f"{where}: {set(inside) ^ set(beside)}"]
+        return [d for k in inside for d in differences(inside[k], beside[k], f"{where}[{k}]")]
     if isinstance(one, np.ndarray):
         return [] if np.array_equal(one, other, equal_nan=one.dtype.kind == "f") else [where]
-    same = (
-        one is other if isinstance(one, Enum) else one == other or (one != one and other != other)
-    )
+    same = one == other or (one != one and other != other)
     return [] if same else [f"{where}: {one} {other}"]
 
 

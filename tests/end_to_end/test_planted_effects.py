@@ -7,6 +7,7 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from benchmarks.battery.judge import Outcome, judge
+from tests.cli.program import SMOKE, Installed
 
 pytest.importorskip("mujoco")
 
@@ -60,3 +61,64 @@ def test_what_only_comes_near_is_told_as_an_approximation() -> None:
     for each in found.found:  # a wave beside the line comes nearer still, and is no better a name
         assert each["verdict"] == "approximation"
         assert each["approximates"] == "a function of q[panda_joint4]"
+
+
+def test_a_sensor_that_saturates_hides_nothing_else_of_its_joint(excite: Installed) -> None:
+    ratio, level = 0.07, 12.0  # N·m, of 24 that the motions need
+    brief = ("--set", "optimizer.max_iterations=40", "--motions", "3", "--seed", "3")
+    excite.answer("optimize", SMOKE, *brief, "-o", "m.h5")
+    excite.answer(
+        "simulate", SMOKE, "m.h5", "-o", "log.h5", "--seed", "5",
+        "--effect", f"load_dependent_friction@shoulder_pitch={ratio}",
+        "--effect", f"torque_saturation@shoulder_pitch={level}",
+    )  # fmt: skip
+    answer = excite.answer("diagnose", SMOKE, "log.h5", "-o", "found.h5")
+    found = {each["kind"]: each for each in answer["effects"]}
+    assert set(found) == {"load_dependent_friction", "torque_saturation"}
+    assert all(each["joints"] == ["shoulder_pitch"] for each in found.values())
+    sizes = {kind: each["parameters"] for kind, each in found.items()}
+    # A third of the samples is left for it, and the others hold it to its first estimate.
+    told = sizes["load_dependent_friction"]["ratio"]["value"]
+    assert told == pytest.approx(ratio, rel=0.1)
+    assert sizes["torque_saturation"]["level"]["value"] == pytest.approx(level, rel=0.01)
+    assert answer["error"]["after"]["relative_moving"]["shoulder_pitch"] < 0.006
+
+
+def names(effects: list[dict]) -> list[tuple[str, list[str]]]:
+    return [(effect["kind"], effect["joints"]) for effect in effects]
+
+
+def test_the_next_motion_settles_what_the_first_left_open(
+    excite: Installed,
+) -> None:
+    """Quadratic friction, small against noise: at low speed it looks viscous."""
+    brief = ("--set", "optimizer.restarts=1", "--set", "optimizer.max_iterations=60")
+    slow = ("--set", "constraints.joint_limits.scale=0.15")
+    size, truth = 0.12, ("nonlinear_viscous_friction", ["elbow"])
+    robot = (
+        "--effect", f"nonlinear_viscous_friction@elbow={size},power:2",
+        "--torque-noise", "0.03", "--seed", "2",
+    )  # fmt: skip
+    excite.answer("optimize", SMOKE, "-o", "slow.h5", "--motions", "1", *brief, *slow)
+    excite.answer("simulate", SMOKE, "slow.h5", "-o", "first.h5", "--repeat", "3", *robot)
+    first = excite.answer("diagnose", SMOKE, "first.h5", "-o", "diagnosis.h5")
+    # Which of the two kinds is named hangs on the noise; that the data cannot tell does not.
+    assert len(first["effects"]) == 1
+    named, aliases = names(first["effects"])[0], names(first["effects"][0]["alias_set"])
+    assert aliases
+    assert truth in (named, *aliases)
+    assert first["next_experiment"]["purpose"] == "separate"
+
+    run = excite(
+        "optimize", SMOKE, "--after", "diagnosis.h5", "-o", "next.h5", "--motions", "1", *brief
+    )
+    assert run.returncode == 0, run.stderr
+    assert f"separates what the data cannot: {named[0]} on elbow / " in run.stderr
+
+    excite.answer("simulate", SMOKE, "next.h5", "-o", "second.h5", *robot)
+    files = ("first.h5", "second.h5", "--held-out", "motion_1_take_3")
+    both = excite.answer("diagnose", SMOKE, *files)
+    assert names(both["effects"]) == [truth]
+    assert both["effects"][0]["alias_set"] == []
+    assert abs(both["effects"][0]["parameters"]["coefficient"]["value"] / size - 1.0) < 0.15
+    assert both["error"]["held_out_run"] == "motion_1_take_3"

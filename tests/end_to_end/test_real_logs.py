@@ -8,13 +8,11 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from benchmarks.real_robots import percent
 from docs.gallery_page import escaped
 from docs.make_gallery import written
-from excite_cli.api.loading import load_case, load_data
 from tests.cli.program import ROOT, Installed
 from tests.docs.test_links import broken
 
@@ -49,21 +47,15 @@ class TestTx40:
     VISCOUS = (8.05, 5.53, 1.97, 1.11, 1.86, 0.65)
     COULOMB = (7.14, 8.26, 6.34, 2.48, 3.03)
 
-    def test_error(self, diagnosed: Any) -> None:
-        error = diagnosed("tx40", "tx40.h5")["error"]
-        assert error["before"]["mean_relative_moving"] > 0.9
-        assert error["after"]["mean_relative_moving"] <= 0.10
-
-    def test_friction_on_all_joints_as_published(self, diagnosed: Any) -> None:
+    def test_error_and_friction_as_published(self, diagnosed: Any) -> None:
         answer = diagnosed("tx40", "tx40.h5")
+        assert answer["error"]["before"]["mean_relative_moving"] > 0.9
+        assert answer["error"]["after"]["mean_relative_moving"] <= 0.10
         lines = {line["joint"]: line for line in answer["friction_lines"]}
         for name, values in (("viscous", self.VISCOUS), ("coulomb", self.COULOMB)):
             for k, value in enumerate(values):
                 found = lines[f"joint_{k + 1}"][name]["value"]
                 assert found == pytest.approx(value, rel=0.1)
-
-    def test_the_coupled_wrist(self, diagnosed: Any) -> None:
-        answer = diagnosed("tx40", "tx40.h5")
         sure = [e["joints"] for e in answer["effects"]
                 if e["kind"] == "coupled_friction" and e["verdict"] == "confirmed"]  # fmt: skip
         assert sure == [["joint_5", "joint_6"]]
@@ -112,29 +104,17 @@ class TestUr10:
 
     BAG = "ur10_exciting_trajectory.db3"
 
-    def test_error(self, diagnosed: Any) -> None:
-        error = diagnosed("ur10_cb", self.BAG)["error"]
+    def test_error_and_names(self, diagnosed: Any) -> None:
+        answer = diagnosed("ur10_cb", self.BAG)
+        error = answer["error"]
         assert error["before"]["mean_relative_moving"] > 0.75
         assert error["after"]["mean_relative_moving"] <= 0.07
         assert error["after"]["mean_relative_moving"] < error["textbook"]["mean_relative_moving"]
-
-    def test_names(self, diagnosed: Any) -> None:
-        answer = diagnosed("ur10_cb", self.BAG)
         offsets = {joint for (joint,) in named(answer, "torque_offset")}
         assert {"wrist_1_joint", "wrist_2_joint", "wrist_3_joint"} <= offsets
         curved = "nonlinear_viscous_friction"  # by a name, or as what comes near it
         both = named(answer, curved) | named(answer, curved, "approximations")
         assert both[("shoulder_pan_joint",)]["power"]["value"] < 1
-
-    def test_the_bag_holds_what_the_file_does(self) -> None:
-        case = load_case(DATA / "ur10_cb" / "ur10_cb.yaml")
-        (bag,), (file,) = (
-            load_data(case, DATA / "ur10_cb" / name, tell=lambda note: None).runs
-            for name in (self.BAG, "ur10_cb.h5")
-        )
-        assert np.array_equal(bag.q, file.q)
-        np.testing.assert_allclose(bag.t - bag.t[0], file.t - file.t[0], atol=1e-12)
-        np.testing.assert_allclose(bag.tau, file.tau, atol=1e-5)  # of single precision
 
 
 class TestKr300:

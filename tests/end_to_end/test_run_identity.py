@@ -4,8 +4,10 @@ Simulated with MuJoCo, read and checked as a measured file, identified and diagn
 6 N·m on one joint in one of three recordings.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +23,7 @@ from excite_cli.identification.identify import Identification, identify
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.measurement.hdf5_writer import write_dataset
+from excite_cli.measurement.missing_values import rows_of
 from excite_cli.robot.model import Robot, build_robot
 from tests.cli.program import SMOKE
 
@@ -86,10 +89,7 @@ def renamed(dataset: Dataset, *names: str) -> Dataset:
 
 def with_gap(run: Run) -> Run:
     kept = (run.t < GAP[0]) | (run.t >= GAP[1])
-    assert run.dq is not None
-    return replace(
-        run, t=run.t[kept], q=run.q[kept], tau=run.tau[kept], dq=run.dq[kept], extra={}
-    )  # fmt: skip
+    return replace(rows_of(run, kept), extra={})
 
 
 def read_again(dataset: Dataset, folder: Path, spec: Spec) -> Dataset:
@@ -117,10 +117,8 @@ def test_an_offset_of_one_run_is_found_whatever_the_run_is_called(
     spec = spec_of(robot, names[1])
     dataset = read_again(renamed(recorded, *names), tmp_path, spec)
     assert dataset.recordings == names
-    for found in (
-        identify(robot, base, dataset, spec),
-        diagnose(robot, base, dataset, spec),
-    ):
+    for call in (identify, diagnose):
+        found: Any = call(robot, base, dataset, spec)
         assert declared_offset(found) == pytest.approx(OFFSET, abs=0.1)
         assert found.held_out_run == names[2]
 
@@ -135,12 +133,10 @@ def test_an_offset_of_one_run_is_found_on_both_sides_of_a_gap(
     assert dataset.recordings == NAMES
     assert len(dataset.runs) == len(NAMES) + len(cut)
     fitted = identify(robot, base, dataset, spec)
-    diagnosed = diagnose(robot, base, dataset, spec)
-    for found in (fitted, diagnosed):
+    for found in (fitted, diagnose(robot, base, dataset, spec)):
         assert declared_offset(found) == pytest.approx(OFFSET, abs=0.1)
         assert found.held_out_run == "c"
-    traces = fitted.traces
-    held_out = [trace.run for trace in traces if trace.held_out]
+    held_out = [trace.run for trace in fitted.traces if trace.held_out]
     assert held_out == (["c/1", "c/2"] if "c" in cut else ["c"])
 
 
@@ -150,12 +146,8 @@ def test_an_offset_of_the_held_out_run_counts_for_the_error(
     """With the offset declared, b and c are held out in turn and predicted alike."""
     spec = spec_of(robot, "b", "c")
     offset = OFFSET * np.eye(robot.n)[1]
-    both = replace(
-        recorded,
-        runs=tuple(
-            replace(run, tau=run.tau + offset) if run.name == "c" else run for run in recorded.runs
-        ),
-    )
+    *others, last = recorded.runs
+    both = replace(recorded, runs=(*others, replace(last, tau=last.tau + offset)))
     error = identify(robot, base, both, spec, held_out="c").error
     without = identify(robot, base, both, spec_of(robot, "b"), held_out="c").error
     assert error.rms[robot.joint_names[1]] < 1.0 < without.rms[robot.joint_names[1]]
@@ -173,30 +165,24 @@ def test_a_stretch_may_be_named_alone(
 
 
 @pytest.mark.parametrize("call", [identify, diagnose])
-def test_a_run_that_is_not_in_the_data_is_named_with_the_nearest(
-    call: object, robot: Robot, base: BaseParameters, recorded: Dataset
+def test_runs_that_are_not_there_or_held_out_are_refused(
+    call: Callable[..., Any], robot: Robot, base: BaseParameters, recorded: Dataset
 ) -> None:
-    assert callable(call)
-    dataset = renamed(recorded, "slow", "payload", "last")
-    with pytest.raises(ConfigError) as error:
-        call(robot, base, dataset, spec_of(robot, "slow", "paylod"))
-    assert str(error.value) == (
-        "effects[2].runs: there is no run 'paylod' in the data. Did you mean 'payload'? "
-        "Runs: slow, payload, last."
-    )
-
-
-@pytest.mark.parametrize("call", [identify, diagnose])
-def test_an_effect_of_the_held_out_run_alone_is_refused(
-    call: object, robot: Robot, base: BaseParameters, recorded: Dataset
-) -> None:
-    """Nothing would be fitted of it, and the error of the held-out run be all its own."""
-    assert callable(call)
-    dataset = renamed(recorded, "slow", "empty", "take 6-12 s")
-    with pytest.raises(ConfigError) as error:
-        call(robot, base, dataset, spec_of(robot, "take 6-12 s"))
-    assert str(error.value) == (
-        "effects[2].runs: 'take 6-12 s' is held out, so that nothing is left to fit torque_offset "
-        "on. Hold out another run: --held-out 'empty'."
-    )
-    call(robot, base, dataset, spec_of(robot, "take 6-12 s"), "empty")
+    """Of an effect of the held-out run alone nothing would be fitted; its error be all its own."""
+    dataset = renamed(recorded, "slow", "payload", "take 6-12 s")
+    for runs, words in (
+        (
+            ("slow", "paylod"),
+            "effects[2].runs: there is no run 'paylod' in the data. Did you mean 'payload'? "
+            "Runs: slow, payload, take 6-12 s.",
+        ),
+        (
+            ("take 6-12 s",),
+            "effects[2].runs: 'take 6-12 s' is held out, so that nothing is left to fit "
+            "torque_offset on. Hold out another run: --held-out 'payload'.",
+        ),
+    ):
+        with pytest.raises(ConfigError) as error:
+            call(robot, base, dataset, spec_of(robot, *runs))
+        assert str(error.value) == words
+    call(robot, base, dataset, spec_of(robot, "take 6-12 s"), "payload")

@@ -1,6 +1,5 @@
 """A motion of a campaign counts as measured once what measured it has ended well, and only then."""
 
-import json
 import shutil
 import signal
 import sys
@@ -19,7 +18,8 @@ from excite_cli.campaign.measured_log import record_measured
 from excite_cli.campaign.supervisor import Ended
 from excite_cli.shown.note import Note
 from tests.campaign.campaign_process import PATIENCE, until
-from tests.cli.program import SMOKE, Program
+from tests.cli.program import Program
+from tests.end_to_end.conftest import state_of, with_program
 
 # Plays by copying a log; notes what it played. Its first take is long, and ends in a failure.
 PLAY = """
@@ -46,12 +46,7 @@ LINE = ("--measure", f"'{sys.executable}' play.py {{motion}} {{data}}")
 @pytest.fixture(scope="module")
 def planned(tmp_path_factory: pytest.TempPathFactory, cache: Path) -> Path:
     """A folder with a campaign whose first motion is planned, and a good log of it."""
-    folder = tmp_path_factory.mktemp("planned")
-    text = SMOKE.read_text(encoding="utf-8")
-    (folder / "smoke.yaml").write_text(
-        text.replace("../data", str(SMOKE.parents[1] / "data")), encoding="utf-8"
-    )
-    (folder / "play.py").write_text(PLAY, encoding="utf-8")
+    folder = with_program(tmp_path_factory.mktemp("planned"), PLAY)
     run = Program(folder, cache)(*ASKED, "--measure", "false {motion} {data}")
     assert "was not measured in 1 tries" in run.stderr, run.stderr
     played(folder / "campaign" / "round_1_motion_1.csv", folder / "good.h5")
@@ -87,8 +82,7 @@ def test_a_log_whose_program_has_failed_is_no_log_after_a_kill_either(begun: Pro
     assert names(begun.folder) == [
         "round_1_motion_1.csv", "round_1_motion_1.csv", "round_1_motion_2.csv",
     ]  # fmt: skip
-    state = json.loads((begun.folder / "campaign" / "campaign.json").read_text())
-    (rejected,) = state["rounds"][0]["motions"][0]["rejected"]
+    (rejected,) = state_of(begun.folder)["rounds"][0]["motions"][0]["rejected"]
     assert "may be half a log" in rejected
 
 
@@ -165,8 +159,7 @@ def test_an_inbox_takes_whole_logs_of_its_motion_and_of_today(
     played(begun.folder / "campaign" / "round_1_motion_3.csv", box / "round_1_motion_3_log.h5")
     campaign.join(PATIENCE)
     assert not campaign.is_alive()
-    state = json.loads((begun.folder / "campaign" / "campaign.json").read_text())
-    motions = state["rounds"][0]["motions"]
+    motions = state_of(begun.folder)["rounds"][0]["motions"]
     assert [motion["data"] for motion in motions] == [
         f"round_1_motion_{k}_log.h5" for k in (1, 2, 3)
     ]

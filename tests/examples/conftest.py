@@ -1,5 +1,6 @@
 from dataclasses import dataclass
 from pathlib import Path
+from subprocess import Popen
 
 import numpy as np
 import pytest
@@ -21,7 +22,8 @@ class Planned:
 
     @property
     def joints(self) -> list[str]:
-        return [name[2:] for name in self._header() if name.startswith("q_")]
+        header = self.motion.read_text().splitlines()[0].split(",")
+        return [name[2:] for name in header if name.startswith("q_")]
 
     @property
     def start(self) -> np.ndarray:
@@ -47,10 +49,6 @@ class Planned:
         path.write_text("".join(lines[: len(lines) // 2]))
         return path
 
-    def _header(self) -> list[str]:
-        with self.motion.open() as file:
-            return file.readline().strip().split(",")
-
 
 def _planned(folder: Path, cache: Path, urdf: Path, *settings: str) -> Planned:
     excite = Program(folder, cache)
@@ -63,6 +61,13 @@ def _planned(folder: Path, cache: Path, urdf: Path, *settings: str) -> Planned:
         run = excite(*command)
         assert run.returncode == 0, run.stderr
     return Planned(urdf, folder / "arm.yaml", folder / "motion.csv")
+
+
+def refusal(process: Popen[str]) -> str:
+    """What a run says at last that measured nothing."""
+    _, stderr = process.communicate(timeout=60)
+    assert process.returncode == 1
+    return stderr.strip().splitlines()[-1]
 
 
 def assert_friction_is_found(excite: Program, planned: Planned, data: Path, *settings: str) -> None:

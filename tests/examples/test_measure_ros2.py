@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 
 from tests.cli.program import ROOT, Program
-from tests.examples.conftest import Planned, assert_friction_is_found
+from tests.examples.conftest import Planned, assert_friction_is_found, refusal
 
 SCRIPT = ROOT / "examples" / "measure_ros2.py"
 Start = Callable[..., subprocess.Popen[str]]
@@ -53,13 +53,6 @@ def start(smoke_arm: Planned, tmp_path: Path) -> Start:
         )
 
     return run
-
-
-def refusal(process: subprocess.Popen[str]) -> str:
-    """What a run says that measured nothing."""
-    _, stderr = process.communicate(timeout=60)
-    assert process.returncode == 1
-    return stderr.strip()
 
 
 def assert_is_a_log(data: Path, planned: Planned, late: float) -> None:
@@ -97,7 +90,7 @@ def test_a_motion_is_played_recorded_and_identified(
         (
             {"off": 0.05, "jam": -1.0},
             "does not get to the start",
-            "accepted 1 for 1.5 s\nended 0\n$",
+            "1 for 1.5 s\nended 0\n$",
         ),
     ],
 )

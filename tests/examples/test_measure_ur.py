@@ -1,17 +1,17 @@
 """`examples/measure_ur.py` as a user runs it, with the real `ur_rtde`, on a stand-in on sockets."""
 
 import signal
-import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from subprocess import PIPE, Popen
 
 import numpy as np
 import pytest
 
 from tests.cli.program import ROOT, Program
-from tests.examples.conftest import Planned, assert_friction_is_found
+from tests.examples.conftest import Planned, assert_friction_is_found, refusal
 from tests.examples.tracking_arm import TrackingArm
 from tests.examples.ur_controller import TORQUE_PER_AMPERE, UrController
 
@@ -29,18 +29,26 @@ def robot(ur10: Planned) -> Iterator[UrController]:
     controller.close()
 
 
-def started(robot: UrController, motion: Path, data: Path, *more: str) -> subprocess.Popen[str]:
+def started(robot: UrController, motion: Path, data: Path, *more: str) -> Popen[str]:
     command = [sys.executable, SCRIPT, "--host", robot.host, "--rate", str(RATE), *more]
-    return subprocess.Popen(
-        [*map(str, command), str(motion), str(data)], stderr=subprocess.PIPE, text=True
-    )
+    return Popen([*map(str, command), str(motion), str(data)], stderr=PIPE, text=True)
 
 
-def refusal(process: subprocess.Popen[str]) -> str:
-    """The last line of stderr of a run that measured nothing."""
-    _, stderr = process.communicate(timeout=60)
-    assert process.returncode == 1
-    return stderr.strip().splitlines()[-1]
+def begun(robot: UrController, planned: Planned, folder: Path, moved: float) -> Popen[str]:
+    """A run whose motion goes on, at `moved` rad/s or more by now."""
+    process = started(robot, planned.motion, folder / "data.csv")
+    while not robot.servoing or robot.moved < moved:
+        assert process.poll() is None
+        time.sleep(0.01)
+    return process
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Waits for it, five seconds at most."""
+    deadline = time.monotonic() + 5.0
+    while not condition() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert condition()
 
 
 def test_a_motion_is_played_recorded_and_identified(
@@ -83,10 +91,7 @@ def test_doubts(
     data = tmp_path / "data.csv"
     assert reason in refusal(started(robot, ur10.motion, data))
     assert not data.exists()
-    deadline = time.monotonic() + 5.0
-    while robot.servoing and time.monotonic() < deadline:  # told to stop, or its watchdog
-        time.sleep(0.05)
-    assert not robot.servoing
+    until(lambda: not robot.servoing)  # told to stop, or its watchdog
 
 
 def test_what_is_refused_before_anything_moves(
@@ -105,10 +110,7 @@ def test_what_is_refused_before_anything_moves(
 
 
 def test_a_signal_stops_the_robot(robot: UrController, ur10: Planned, tmp_path: Path) -> None:
-    process = started(robot, ur10.motion, tmp_path / "data.csv")
-    while not robot.servoing or robot.moved < 0.1:
-        assert process.poll() is None
-        time.sleep(0.01)
+    process = begun(robot, ur10, tmp_path, 0.1)
     process.terminate()
     process.send_signal(signal.SIGINT)  # Ctrl-C reaches the command and what started it
     assert "stopped by SIG" in refusal(process)
@@ -118,13 +120,7 @@ def test_a_signal_stops_the_robot(robot: UrController, ur10: Planned, tmp_path: 
 def test_a_killed_process_leaves_a_robot_that_stops(
     robot: UrController, ur10: Planned, tmp_path: Path
 ) -> None:
-    process = started(robot, ur10.motion, tmp_path / "data.csv")
-    while not robot.servoing:
-        assert process.poll() is None
-        time.sleep(0.01)
+    process = begun(robot, ur10, tmp_path, 0.0)
     process.kill()
     process.communicate()
-    deadline = time.monotonic() + 5.0
-    while not robot.ended and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert robot.ended == "watchdog"
+    until(lambda: robot.ended == "watchdog")

@@ -40,16 +40,15 @@ def _type(name: str) -> str:
 
 
 class UrController:
-    """Plays set points with `arm`; what it saw is in `commands`, `moved` and `ended`."""
+    """Plays set points with `arm`; what it saw is in `moved`, `moved_to` and `ended`."""
 
-    def __init__(self, arm: TrackingArm, version: tuple[int, int] = (3, 15)) -> None:
-        self.arm, self.version = arm, version
+    def __init__(self, arm: TrackingArm) -> None:
+        self.arm = arm
         self.host = f"127.{os.getpid() % 200 + 20}.{os.getpid() // 200 % 250}.{next(_addresses)}"
         self.scaling = 1.0
         self.protective_stop_at, self.hang_up_at = np.inf, np.inf  # s after the first set point
         self.unplug_at, self.jam_at, self.unplugged = np.inf, np.inf, False
         self.limit = np.inf  # rad, of the safety planes
-        self.commands: list[int] = []
         self.ended, self.moved = "", 0.0  # by what; rad/s, the fastest joint so far
         self.moved_to: tuple[np.ndarray, float] | None = None  # of movej, at rad/s
         self.time, self.safety, self.servoing = 1000.0, 0, 0.0
@@ -59,15 +58,9 @@ class UrController:
         self.lock, self.fresh, self.closed = threading.RLock(), threading.Event(), False
         self.unanswered: list[socket.socket] = []
         self.clients: list[tuple[socket.socket, list[str]]] = []
-        self.servers = [
-            (socket.create_server((self.host, port)), serve)
-            for port, serve in (
-                (29999, self._dashboard),
-                (30003, self._script),
-                (30004, self._exchange),
-            )
-        ]
-        for server, serve in self.servers:
+        serves = {29999: self._dashboard, 30003: self._script, 30004: self._exchange}
+        self.servers = [socket.create_server((self.host, port)) for port in serves]
+        for server, serve in zip(self.servers, serves.values(), strict=True):
             threading.Thread(target=self._accept, args=(server, serve), daemon=True).start()
         threading.Thread(target=self._run, daemon=True).start()
 
@@ -79,7 +72,7 @@ class UrController:
 
     def close(self) -> None:
         self.closed = True
-        for server, _ in self.servers:
+        for server in self.servers:
             with contextlib.suppress(OSError):
                 server.shutdown(socket.SHUT_RDWR)  # ends `accept`
             server.close()
@@ -123,7 +116,7 @@ class UrController:
                 continue
             answer = b"\x01"
             if kind == b"v":
-                answer = struct.pack(">4I", *self.version, 0, 0)
+                answer = struct.pack(">4I", 3, 15, 0, 0)
             elif kind in b"OI":
                 names = body[8 if kind == b"O" else 0 :].decode().strip(",").split(",")
                 if kind == b"O":
@@ -144,8 +137,6 @@ class UrController:
                 return
             self.registers.update(zip(names, struct.unpack(form, body), strict=True))
             command = int(self.registers["input_int_register_0"])
-            if command and (not self.commands or self.commands[-1] != command):
-                self.commands.append(command)
             self.fed = time.monotonic()
         if command == SERVOJ:
             self.fresh.set()
@@ -237,11 +228,9 @@ class UrController:
         for client, names in list(self.clients):
             body = b"\x01"
             for name in names:
-                value = values.get(name) if name in values else (self.registers.get(name, 0),)
-                whole = _type(name) in ("INT32", "UINT32")
-                body += struct.pack(
-                    ">" + _PACKED[_type(name)], *(int(x) if whole else x for x in value)
-                )
+                value = values.get(name, (self.registers.get(name, 0),))
+                kind = int if _type(name) in ("INT32", "UINT32") else float
+                body += struct.pack(">" + _PACKED[_type(name)], *map(kind, value))
             try:
                 client.sendall(struct.pack(">Hc", 3 + len(body), b"U") + body)
             except OSError:

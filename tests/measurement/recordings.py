@@ -1,12 +1,15 @@
 """Recordings made up for tests: three joints in a smooth motion, torque with noise."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from excite_cli.config.data_spec import MeasurementSpec
+from excite_cli.errors import FileError
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.measurement.limits import Limits
@@ -52,15 +55,31 @@ def read(path: Path, *joints: str, **declared: Any) -> Dataset:
     return read_dataset([path], MeasurementSpec(**declared), joints or JOINTS)
 
 
-def write_csv(path: Path, run: Run, joints: tuple[str, ...] = JOINTS, separator: str = ",") -> Path:
-    """`t, q_…, dq_…, tau_…` with all digits."""
-    columns = {"t": run.t}
-    for channel, values in (("q", run.q), ("dq", run.dq), ("tau", run.tau)):
-        if values is not None:
-            columns |= {f"{channel}_{j}": values[:, k] for k, j in enumerate(joints)}
-    rows = [separator.join(columns)]
-    rows += [
-        separator.join(map(repr, row)) for row in np.column_stack(list(columns.values())).tolist()
-    ]
-    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+def refused(path: Path, *parts: str, **declared: Any) -> None:
+    """A file that is not read: the message names it, and has these parts."""
+    with pytest.raises(FileError) as caught:
+        read(path, **declared)
+    for part in (str(path), *parts):
+        assert part in str(caught.value)
+
+
+def write_table(path: Path, columns: Mapping[str, np.ndarray], separator: str = ",") -> Path:
+    """A CSV of columns (T,) with all digits."""
+    table = np.column_stack(list(columns.values()))
+    header = separator.join(columns)
+    np.savetxt(path, table, "%.17g", separator, header=header, comments="", encoding="utf-8")
     return path
+
+
+def named(channel: str, values: np.ndarray, joints: tuple[str, ...] = JOINTS) -> dict[str, Any]:
+    """Columns `channel_joint` of values (T, n)."""
+    return {f"{channel}_{joint}": values[:, k] for k, joint in enumerate(joints)}
+
+
+def write_csv(path: Path, run: Run, joints: tuple[str, ...] = JOINTS, separator: str = ",") -> Path:
+    """`t, q_…, dq_…, tau_…`."""
+    columns = {"t": run.t}
+    for channel in ("q", "dq", "tau"):
+        values = getattr(run, channel)
+        columns |= {} if values is None else named(channel, values, joints)
+    return write_table(path, columns, separator)

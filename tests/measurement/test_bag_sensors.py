@@ -12,8 +12,7 @@ from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import FileError
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Dataset
-from tests.measurement.recordings import JOINTS, motion, only
-from tests.measurement.standing_bags import (
+from tests.measurement.bags import (
     COVARIANT,
     IMU,
     ODOMETRY,
@@ -23,6 +22,7 @@ from tests.measurement.standing_bags import (
     Topic,
     write_standing,
 )
+from tests.measurement.recordings import JOINTS, motion, only
 
 SECONDS = 1.5
 T = np.arange(int(SECONDS * 100)) / 100.0
@@ -47,9 +47,22 @@ def turning(t: np.ndarray) -> np.ndarray:
 FOOT = Topic(WRENCH, OWN, signals(OWN))
 
 
-def read(path: Path, *rows: str, **declared: Any) -> Dataset:
-    declared.setdefault("wrench", [{"channel": "/foot"}])
-    return read_dataset([path], MeasurementSpec(**declared), JOINTS, rows=rows or ("base",))
+Read = Callable[..., Dataset]
+
+
+@pytest.fixture
+def reading(tmp_path: Path) -> Read:
+    """Writes a bag of these topics beside the foot's, and reads it."""
+
+    def write_and_read(
+        *rows: str, topics: dict[str, Topic] | None = None, states: States = STATES,
+        file: str = "log", **declared: Any,
+    ) -> Dataset:  # fmt: skip
+        path = write_standing(tmp_path / file, states, {"/foot": FOOT, **(topics or {})})
+        declared.setdefault("wrench", [{"channel": "/foot"}])
+        return read_dataset([path], MeasurementSpec(**declared), JOINTS, rows=rows or ("base",))
+
+    return write_and_read
 
 
 def close(found: np.ndarray, wanted: np.ndarray) -> None:
@@ -58,9 +71,8 @@ def close(found: np.ndarray, wanted: np.ndarray) -> None:
 
 @pytest.mark.parametrize("file", ["log", "log.bag"])
 @pytest.mark.parametrize("declared", ["/foot", "foot"])
-def test_a_wrench_is_put_onto_the_joint_states(tmp_path: Path, file: str, declared: str) -> None:
-    data = read(write_standing(tmp_path / file, STATES, {"/foot": FOOT}),
-                wrench=[{"channel": declared}])  # fmt: skip
+def test_a_wrench_is_put_onto_the_joint_states(reading: Read, file: str, declared: str) -> None:
+    data = reading(file=file, wrench=[{"channel": declared}])
     assert data.findings == ()
     (run,) = data.runs
     np.testing.assert_array_equal(run.q, STATES.q)
@@ -69,92 +81,70 @@ def test_a_wrench_is_put_onto_the_joint_states(tmp_path: Path, file: str, declar
     assert not run.usable().any()  # no effort was recorded
 
 
-def test_efforts_are_needed_where_joints_are_rows(tmp_path: Path) -> None:
-    path = write_standing(tmp_path / "a", STATES, {"/foot": FOOT})
+def test_efforts_are_needed_where_joints_are_rows(reading: Read) -> None:
     with pytest.raises(FileError, match="carry no effort; needed: position and effort"):
-        read(path, "base", "joints")
+        reading("base", "joints")
     states = replace(STATES, tau=signals(T, 3))
-    (run,) = read(write_standing(tmp_path / "b", states, {"/foot": FOOT}), "base", "joints").runs
+    (run,) = reading("base", "joints", states=states, file="b").runs
     np.testing.assert_array_equal(run.tau, signals(T, 3))
-
-
-def test_a_robot_that_does_not_stand_needs_none_of_it(tmp_path: Path) -> None:
-    states = replace(STATES, tau=signals(T, 3))
-    (run,) = read(write_standing(tmp_path / "log", states, {}), "joints").runs
+    (run,) = reading("joints", states=states, file="c").runs  # it does not stand
     assert "foot" not in run.extra
 
 
-def test_one_topic_is_gyroscope_and_accelerometer(tmp_path: Path) -> None:
-    unit = Topic(IMU, OWN, signals(OWN) + 1.0)
-    path = write_standing(tmp_path / "log", STATES, {"/foot": FOOT, "/imu/data": unit})
+def test_one_topic_or_two_are_gyroscope_and_accelerometer(reading: Read) -> None:
+    unit = {"/imu/data": Topic(IMU, OWN, signals(OWN) + 1.0)}
     names = {"gyroscope": "/imu/data", "accelerometer": "/imu/data"}
-    (run,) = read(path, base={"imu": names}).runs
+    (run,) = reading(topics=unit, base={"imu": names}).runs
     close(run.extra["imu_data"], signals(T) + 1.0)
-
-
-def test_two_topics_are_gyroscope_and_accelerometer(tmp_path: Path) -> None:
-    topics = {
-        "/foot": FOOT,
+    two = {
         "/gyro": Topic(IMU, OWN, signals(OWN), absent="linear_acceleration"),
         "/acc": Topic(IMU, OWN, signals(OWN) + 1.0, absent="angular_velocity"),
     }
-    path = write_standing(tmp_path / "log", STATES, topics)
-    (run,) = read(path, base={"imu": {"gyroscope": "/gyro", "accelerometer": "/acc"}}).runs
+    names = {"gyroscope": "/gyro", "accelerometer": "/acc"}
+    (run,) = reading(topics=two, file="two", base={"imu": names}).runs
     close(run.extra["gyro"], signals(T)[:, :3])
     close(run.extra["acc"], signals(T)[:, 3:] + 1.0)
+    names = {"gyroscope": "/acc", "accelerometer": "/gyro"}
     with pytest.raises(FileError, match=r"/acc .*gyroscope\) holds no angular_velocity: its cov"):
-        read(path, base={"imu": {"gyroscope": "/acc", "accelerometer": "/gyro"}})
+        reading(topics=two, file="turned", base={"imu": names})
 
 
 @pytest.mark.parametrize("kind", [POSE, ODOMETRY, COVARIANT])
-def test_poses_keep_unit_quaternions_through_changes_of_sign(tmp_path: Path, kind: str) -> None:
+def test_poses_keep_unit_quaternions_through_changes_of_sign(reading: Read, kind: str) -> None:
     poses = turning(OWN)
     poses[len(OWN) // 3 :: 2, 3:] *= -1.0  # the same orientations
-    path = write_standing(
-        tmp_path / "log", STATES, {"/foot": FOOT, "/odom": Topic(kind, OWN, poses)}
-    )
-    (run,) = read(path, base={"pose": "/odom"}).runs
+    (run,) = reading(topics={"/odom": Topic(kind, OWN, poses)}, base={"pose": "/odom"}).runs
     close(run.extra["odom"], turning(T))
     sizes = np.linalg.norm(run.extra["odom"][:, 3:], axis=1)  # a chord is shorter by 9e-6
     np.testing.assert_allclose(sizes, 1.0, rtol=0, atol=1e-12)
-
-
-def test_an_orientation_that_is_none(tmp_path: Path) -> None:
-    poses = turning(OWN)
     poses[7, 3:] = 0.0
-    path = write_standing(
-        tmp_path / "log", STATES, {"/foot": FOOT, "/pose": Topic(POSE, OWN, poses)}
-    )
+    none = {"/pose": Topic(kind, OWN, poses)}
     with pytest.raises(FileError, match=r"/pose \(measurement.base.pose\): 1 of .* 0, 0, 0, 0"):
-        read(path, base={"pose": "/pose"})
+        reading(topics=none, file="none", base={"pose": "/pose"})
 
 
-def test_a_topic_that_is_not_there(tmp_path: Path) -> None:
-    path = write_standing(tmp_path / "log", STATES, {"/left_foot": FOOT})
+@pytest.mark.parametrize(
+    ("declared", "words"),
+    [
+        ("/fot", "{} has no topic '/fot', which measurement.wrench names. Did you mean '/foot'? "
+                 "It has: /foot (geometry_msgs/msg/WrenchStamped), /imu (sensor_msgs/msg/Imu), "
+                 "/joint_states (sensor_msgs/msg/JointState)."),
+        ("imu", "{}: topic 'imu' (measurement.wrench) is of type sensor_msgs/msg/Imu; read are "
+                "geometry_msgs/msg/WrenchStamped. Of these types it has: /foot."),
+    ],
+)  # fmt: skip
+def test_a_topic_that_is_not_there_or_of_another_type(
+    reading: Read, tmp_path: Path, declared: str, words: str
+) -> None:
     with pytest.raises(FileError) as caught:
-        read(path, wrench=[{"channel": "/left_fot"}])
-    assert str(caught.value) == (
-        f"{path} has no topic '/left_fot', which measurement.wrench names. Did you mean "
-        "'/left_foot'? It has: /joint_states (sensor_msgs/msg/JointState), /left_foot "
-        "(geometry_msgs/msg/WrenchStamped)."
-    )
+        reading(topics={"/imu": Topic(IMU, OWN, signals(OWN))}, wrench=[{"channel": declared}])
+    assert str(caught.value) == words.format(tmp_path / "log")
 
 
-def test_a_topic_of_another_type(tmp_path: Path) -> None:
-    unit = Topic(IMU, OWN, signals(OWN))
-    path = write_standing(tmp_path / "log", STATES, {"/foot": FOOT, "/imu": unit})
-    with pytest.raises(FileError) as caught:
-        read(path, wrench=[{"channel": "imu"}])
-    assert str(caught.value) == (
-        f"{path}: topic 'imu' (measurement.wrench) is of type sensor_msgs/msg/Imu; read are "
-        "geometry_msgs/msg/WrenchStamped. Of these types it has: /foot."
-    )
-
-
-def test_ragged_ends_are_cut_and_told(tmp_path: Path) -> None:
+def test_ragged_ends_are_cut_and_told(reading: Read) -> None:
     some = (OWN > 0.2) & (OWN < 1.3)
     foot = Topic(WRENCH, OWN[some], FOOT.values[some])
-    data = read(write_standing(tmp_path / "log", STATES, {"/foot": foot}))
+    data = reading(topics={"/foot": foot})
     inside = (foot.t[0] <= T) & (foot.t[-1] >= T)
     assert f"/foot has messages from {foot.t[0]:.3f}" in only(data.findings, "ragged").text
     assert f"{np.sum(~inside)} joint states outside are left out" in data.findings[0].text
@@ -163,51 +153,47 @@ def test_ragged_ends_are_cut_and_told(tmp_path: Path) -> None:
     close(run.extra["foot"], signals(T[inside]))
 
 
-def test_late_messages_are_put_in_order(tmp_path: Path) -> None:
+def test_late_messages_are_put_in_order(reading: Read) -> None:
     order = np.arange(len(OWN))
     order[40:43] = [42, 40, 41]
-    foot = Topic(WRENCH, OWN[order], FOOT.values[order])
-    (run,) = read(write_standing(tmp_path / "log", STATES, {"/foot": foot})).runs
+    (run,) = reading(topics={"/foot": Topic(WRENCH, OWN[order], FOOT.values[order])}).runs
     close(run.extra["foot"], signals(T))
 
 
-def test_empty_headers_fall_back_to_the_time_of_recording(tmp_path: Path) -> None:
+def test_empty_headers_fall_back_to_the_time_of_recording(reading: Read) -> None:
     foot = Topic(WRENCH, OWN - 0.005, FOOT.values, stamped=False)  # recorded 5 ms later
-    data = read(write_standing(tmp_path / "log", STATES, {"/foot": foot}))
+    data = reading(topics={"/foot": foot})
     assert "header stamps of /foot are empty" in only(data.findings, "stamps").text
     close(data.runs[0].extra["foot"], signals(T))
 
 
-def test_a_single_stamp_far_off_costs_no_more_than_itself(tmp_path: Path) -> None:
+def test_a_single_stamp_far_off_costs_no_more_than_itself(reading: Read) -> None:
     t = T.copy()
     t[70] += 1000.0
-    states = States(JOINTS, t, STATES.q)
-    data = read(write_standing(tmp_path / "log", states, {"/foot": FOOT}))
+    data = reading(states=replace(STATES, t=t))
     assert "1 joint states outside are left out" in only(data.findings[:1], "ragged").text
     assert len(data.runs) == 1
     close(data.runs[0].extra["foot"][:70], signals(T[:70]))
 
 
-def test_topics_that_never_meet(tmp_path: Path) -> None:
+def test_topics_that_never_meet(reading: Read) -> None:
     early, late = OWN[OWN < 0.7], OWN[OWN > 0.8]
     topics = {
         "/foot": Topic(WRENCH, early, signals(early)),
         "/imu": Topic(IMU, late, signals(late)),
     }
-    path = write_standing(tmp_path / "log", STATES, topics)
     with pytest.raises(FileError, match="at no instant all topics that `measurement` names are"):
-        read(path, base={"imu": {"gyroscope": "/imu", "accelerometer": "/imu"}})
+        reading(topics=topics, base={"imu": {"gyroscope": "/imu", "accelerometer": "/imu"}})
 
 
 def _paused(t: np.ndarray) -> np.ndarray:
     return t[(t < 0.6) | (t > 0.7)]
 
 
-def test_what_is_recorded_again_after_a_pause_of_all_is_no_gap(tmp_path: Path) -> None:
+def test_what_is_recorded_again_after_a_pause_of_all_is_no_gap(reading: Read) -> None:
     t, own = _paused(T), _paused(OWN)
     states = States(JOINTS, t, motion(t)[0])
-    path = write_standing(tmp_path / "log", states, {"/foot": Topic(WRENCH, own, signals(own))})
-    data = read(path)
+    data = reading(topics={"/foot": Topic(WRENCH, own, signals(own))}, states=states)
     only(data.findings, "gap")
     close(np.concatenate([run.extra["foot"] for run in data.runs]), signals(t))
 
@@ -227,10 +213,9 @@ def test_what_is_recorded_again_after_a_pause_of_all_is_no_gap(tmp_path: Path) -
     ],
 )  # fmt: skip
 def test_what_does_not_cover_the_joint_states(
-    tmp_path: Path, own: Callable[[np.ndarray], np.ndarray], words: str
+    reading: Read, tmp_path: Path, own: Callable[[np.ndarray], np.ndarray], words: str
 ) -> None:
     t = own(OWN)
-    path = write_standing(tmp_path / "log", STATES, {"/foot": Topic(WRENCH, t, signals(t))})
     with pytest.raises(FileError, match=words) as caught:
-        read(path)
-    assert str(path) in str(caught.value)
+        reading(topics={"/foot": Topic(WRENCH, t, signals(t))})
+    assert str(tmp_path / "log") in str(caught.value)

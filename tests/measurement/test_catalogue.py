@@ -1,4 +1,4 @@
-"""From several files to one data set: names of runs, readers, messages."""
+"""From several files to one data set: names of runs, readers, messages, when each was recorded."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -9,11 +9,12 @@ import pytest
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import FileError
 from excite_cli.measurement import reader as reading
+from excite_cli.measurement.campaign_clock import on_campaign_clock
 from excite_cli.measurement.catalogue import read_dataset
-from excite_cli.measurement.dataset import Dataset
+from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.measurement.hdf5_writer import write_dataset
-from excite_cli.measurement.run_identity import Origin
-from tests.measurement.recordings import JOINTS, read, recorded, write_csv
+from excite_cli.measurement.run_identity import Origin, Part
+from tests.measurement.recordings import JOINTS, read, recorded, refused, write_csv
 
 
 def test_run_names_are_unique(tmp_path: Path) -> None:
@@ -65,8 +66,7 @@ def test_a_joint_without_torque_needs_no_column_and_none_of_it_counts(
     if not recorded_too:
         rows = [line.rsplit(",", 1)[0] for line in path.read_text().splitlines()]
         path.write_text("\n".join(rows) + "\n")
-        with pytest.raises(FileError, match=r"no torque of joint 'wrist'.*without_torque: \[wrist"):
-            read(path)
+        refused(path, "no torque of joint 'wrist'", "without_torque: [wrist")
     data = read(path, without_torque=["wrist"])
     assert data.findings == ()
     np.testing.assert_allclose(data.runs[0].q, run.q)
@@ -83,15 +83,44 @@ def test_files_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         ("folder", "is a folder without a bag"),
         ("folder.h5", "is a folder without a bag"),
     ):
-        with pytest.raises(FileError) as caught:
-            read(tmp_path / name)
-        assert part in str(caught.value)
+        refused(tmp_path / name, part)
     with pytest.raises(FileError, match="No measured file"):
         read_dataset([], MeasurementSpec(), JOINTS)
     path = write_csv(tmp_path / "log.csv", recorded())
     monkeypatch.setattr(reading, "MAX_VALUES", 1000)
-    with pytest.raises(FileError, match="holds 16,000 numbers; up to 1,000"):
-        read(path)
+    refused(path, "holds 16,000 numbers; up to 1,000")
     monkeypatch.setattr(reading, "MAX_BYTES", 1000)
-    with pytest.raises(FileError, match="GiB; measured files of up to"):
-        read(path)
+    refused(path, "GiB; measured files of up to")
+
+
+NOON = 1.7e9
+
+
+def began(name: str, epoch: float | None = None, first: float = 0.0, part: Part = Part()) -> Run:
+    t = first + np.arange(101) * 0.1
+    return Run(name, t, np.zeros((101, 1)), np.zeros((101, 1)), epoch=epoch, part=part)
+
+
+@pytest.mark.parametrize(
+    ("runs", "starts"),
+    [
+        # Stamps count from the earliest recording, whatever the order of the files.
+        ([began("b", NOON + 3600.0), began("a", NOON)], [3600.0, 0.0]),
+        # A first sample later than zero is where the campaign begins.
+        ([began("a", NOON, 5.0), began("b", NOON + 60.0)], [-5.0, 55.0]),
+        # A clock that starts anew gives all recordings one epoch; one may also be missing, or
+        # overlap: the order counts.
+        *(
+            ([began("a", NOON), began("b", epoch), began("c", NOON + 900.0)], [0.0, 10.0, 20.0])
+            for epoch in (None, NOON, NOON + 8.0)
+        ),
+        ([began("a", first=5.0), began("b", first=1.0)], [-5.0, 9.0]),
+        # Clocks that are set while they run may cross a little.
+        ([began("a", NOON), began("b", NOON + 9.5)], [0.0, 9.5]),
+        # Stretches of a recording share its beginning.
+        ([*(began("a", first=20.0 * k, part=Part(k + 1, start=20.0 * k)) for k in range(2)),
+          began("b")], [0.0, 0.0, 30.0]),
+    ],
+)  # fmt: skip
+def test_when_recordings_began_on_the_campaigns_clock(runs: list[Run], starts: list[float]) -> None:
+    assert [each.start for each in on_campaign_clock(runs)] == pytest.approx(starts)

@@ -8,8 +8,9 @@ import pytest
 
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.measurement.covariates import with_declared
-from excite_cli.measurement.dataset import Array, Dataset, Run
+from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.hdf5_writer import write_dataset
+from excite_cli.measurement.missing_values import rows_of
 from tests.measurement.recordings import JOINTS, check, only, read, recorded, write_csv
 
 WARM = "temp_elbow"
@@ -25,17 +26,10 @@ def csv_with(path: Path, **columns: list[str]) -> Path:
     return path
 
 
-def once_a_second(values: Array, rate: int = 200) -> list[str]:
-    return [f"{x:.6f}" if k % rate == 0 else "" for k, x in enumerate(values)]
-
-
-def with_column(run: Run, values: Array) -> Run:
-    return replace(run, covariates={WARM: values})
-
-
 def test_a_slow_column_is_interpolated_and_held_at_the_end(tmp_path: Path) -> None:
     t = recorded(2.0).t
-    path = csv_with(tmp_path / "log.csv", **{WARM: once_a_second(20.0 + 5.0 * t)})
+    once_a_second = [f"{20.0 + 5.0 * x:.6f}" if k % 200 == 0 else "" for k, x in enumerate(t)]
+    path = csv_with(tmp_path / "log.csv", **{WARM: once_a_second})
     data = read(path, covariates=[WARM])
     assert only(data.findings, "interpolated").severity == "note"
     found = data.runs[0].covariates[WARM]
@@ -70,16 +64,13 @@ def test_arrays_have_a_column_for_every_joint_or_number(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again.covariates[WARM], run.q[:, 1])
 
 
-def test_a_name_that_no_file_has_is_refused_with_the_nearest(tmp_path: Path) -> None:
+def test_a_column_that_no_file_or_not_every_run_has_is_refused(tmp_path: Path) -> None:
     path = csv_with(tmp_path / "log.csv", **{WARM: ["1"] * 400})
     with pytest.raises(ConfigError, match=r"no file has a column 'temp_ebow'.*temp_elbow"):
         read(path, covariates=["temp_ebow"])
-
-
-def test_a_run_without_a_column_that_others_have_is_refused(tmp_path: Path) -> None:
-    runs = (recorded(2.0, name="a"), recorded(2.0, name="b", seed=1))
-    with_it = replace(runs[0], extra={"ambient": runs[0].t})
-    write_dataset(tmp_path / "a.h5", Dataset(JOINTS, (with_it, runs[1])), {})
+    first, second = recorded(2.0, name="a"), recorded(2.0, name="b", seed=1)
+    runs = (replace(first, extra={"ambient": first.t}), second)
+    write_dataset(tmp_path / "a.h5", Dataset(JOINTS, runs), {})
     with pytest.raises(FileError, match=r"run b: there is no column 'ambient'"):
         read(tmp_path / "a.h5", covariates=["ambient"])
 
@@ -99,32 +90,23 @@ def test_long_times_without_a_value_are_told_and_none_at_all_is_an_error() -> No
     run = recorded(30.0)
     column = 20.0 + run.t
     column[1000:5000] = np.nan
-    (kept,), findings = check(with_column(run, column))
+    (kept,), findings = check(replace(run, covariates={WARM: column}))
     assert only(findings, "interpolated").severity == "warning"
     assert "20 s" in findings[0].text
     assert kept.covariates[WARM] == pytest.approx(20.0 + run.t)
-    _, findings = check(with_column(run, np.full(len(run.t), np.nan)))
+    _, findings = check(replace(run, covariates={WARM: np.full(len(run.t), np.nan)}))
     assert only(findings, "dead").severity == "error"
 
 
 def test_columns_follow_the_run_through_gaps_jitter_and_lost_rows() -> None:
     run = recorded(8.0)
-    rng = np.random.default_rng(0)
-    jittered = replace(run, t=run.t + rng.uniform(-2e-4, 2e-4, len(run.t)))
-    kept = np.ones(len(run.t), bool)
-    kept[700:900] = False  # a gap of a second
-    position = run.q.copy()
-    position[300, 1] = np.nan
-    gappy = replace(
-        jittered, t=jittered.t[kept], q=position[kept], tau=run.tau[kept], dq=None,
-        covariates={WARM: (20.0 + 3.0 * jittered.t)[kept]},
-    )  # fmt: skip
-    parts, _ = check(gappy)
+    t = run.t + np.random.default_rng(0).uniform(-2e-4, 2e-4, len(run.t))
+    jittered = replace(run, t=t, dq=None, covariates={WARM: 20.0 + 3.0 * t}, q=run.q.copy())
+    jittered.q[300, 1] = np.nan
+    parts, _ = check(rows_of(jittered, (run.t < 3.5) | (run.t >= 4.5)))
     assert len(parts) == 2
-    for part in parts:
+    for part in (*parts, parts[0].cut(100, 200)):
         assert part.covariates[WARM] == pytest.approx(20.0 + 3.0 * part.t, abs=1e-9)
-    half = parts[0].cut(100, 200)
-    assert half.covariates[WARM] == pytest.approx(20.0 + 3.0 * half.t, abs=1e-9)
 
 
 def test_data_at_hand_give_their_channels_for_columns() -> None:

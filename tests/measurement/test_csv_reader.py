@@ -2,6 +2,7 @@
 
 import gzip
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,184 +12,155 @@ from hypothesis.extra.numpy import arrays
 
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.measurement.csv_table import read_table
-from tests.measurement.recordings import JOINTS, only, read, recorded, without_speed, write_csv
+from tests.measurement.recordings import (
+    JOINTS,
+    only,
+    read,
+    recorded,
+    refused,
+    without_speed,
+    write_csv,
+)
+
+RUN = recorded()
 
 
-def refused(path: Path, text: str, *parts: str, **declared: object) -> str:
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(FileError) as caught:
-        read(path, **declared)
-    message = str(caught.value)
-    assert str(path) in message
-    for part in parts:
-        assert part in message
-    return message
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    return write_csv(tmp_path / "log.csv", RUN)
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t", " ", ", "])
 def test_round_trip(tmp_path: Path, separator: str) -> None:
-    run = recorded()
-    data = read(write_csv(tmp_path / "log.csv", run, separator=separator))
+    data = read(write_csv(tmp_path / "log.csv", RUN, separator=separator))
     assert data.findings == ()
     (back,) = data.runs
     assert back.name == "log"
     for name in ("t", "q", "dq", "tau"):
-        np.testing.assert_array_equal(getattr(back, name), getattr(run, name))
+        np.testing.assert_array_equal(getattr(back, name), getattr(RUN, name))
 
 
-def test_columns_are_matched_by_name(tmp_path: Path) -> None:
-    run = recorded()
-    path = write_csv(tmp_path / "log.csv", run)
-    back = read(path, "wrist", "shoulder", "elbow").runs[0]
-    np.testing.assert_array_equal(back.tau, run.tau[:, [2, 0, 1]])
-    np.testing.assert_array_equal(back.dq, run.dq[:, [2, 0, 1]])  # type: ignore[index]
+def test_columns_are_matched_by_name(log: Path) -> None:
+    back = read(log, "wrist", "shoulder", "elbow").runs[0]
+    np.testing.assert_array_equal(back.tau, RUN.tau[:, [2, 0, 1]])
+    np.testing.assert_array_equal(back.dq, RUN.dq[:, [2, 0, 1]])  # type: ignore[index]
 
 
-def test_packed_with_byte_order_mark(tmp_path: Path) -> None:
-    text = write_csv(tmp_path / "log.csv", recorded()).read_text()
-    path = tmp_path / "log.csv.gz"
+def test_packed_with_byte_order_mark_or_with_a_header_behind_a_hash(log: Path) -> None:
+    text = log.read_text()
+    path = log.with_name("log.csv.gz")
     path.write_bytes(gzip.compress(("\ufeff" + text).encode()))
     assert len(read(path).runs[0].t) == 1600
-
-
-def test_header_behind_a_hash(tmp_path: Path) -> None:
-    run = without_speed(recorded())
-    header = ",".join(["t", *(f"q_{j}" for j in JOINTS), *(f"tau_{j}" for j in JOINTS)])
-    path = tmp_path / "log.txt"
-    np.savetxt(path, np.column_stack([run.t, run.q, run.tau]), delimiter=",", header=header)
-    np.testing.assert_array_equal(read(path).runs[0].q, run.q)
+    log.write_text("# " + text)  # as NumPy writes it
+    np.testing.assert_array_equal(read(log).runs[0].q, RUN.q)
 
 
 def test_decimal_comma(tmp_path: Path) -> None:
-    run = recorded()
-    path = write_csv(tmp_path / "log.csv", run, separator=";")
+    path = write_csv(tmp_path / "log.csv", RUN, separator=";")
     path.write_text(path.read_text().replace(".", ","))
     data = read(path)
     only(data.findings, "decimal_comma")
-    np.testing.assert_array_equal(data.runs[0].tau, run.tau)
+    np.testing.assert_array_equal(data.runs[0].tau, RUN.tau)
 
 
 def test_numbered_columns_say_their_order(tmp_path: Path) -> None:
-    run = recorded()
-    data = read(write_csv(tmp_path / "log.csv", run, ("1", "2", "3")))
+    path = write_csv(tmp_path / "log.csv", RUN, ("1", "2", "3"))
+    data = read(path)
     found = only(data.findings, "numbered")
     assert found.severity == "note"
     assert "1 is shoulder, 2 is elbow, 3 is wrist" in found.text
-    np.testing.assert_array_equal(data.runs[0].q, run.q)
-
-
-def test_numbered_columns_that_do_not_fit(tmp_path: Path) -> None:
-    path = write_csv(tmp_path / "log.csv", recorded(), ("1", "2", "3"))
+    np.testing.assert_array_equal(data.runs[0].q, RUN.q)
     with pytest.raises(FileError, match=r"moves 2 joints \(a, b\).*measurement.names"):
         read(path, "a", "b")
 
 
-def test_names_lead_to_joints(tmp_path: Path) -> None:
-    run = recorded()
-    path = write_csv(tmp_path / "log.csv", run, ("A1", "A2", "A3"))
+def test_names_lead_to_joints(log: Path, tmp_path: Path) -> None:
+    path = write_csv(tmp_path / "other.csv", RUN, ("A1", "A2", "A3"))
     names = {"A3": "shoulder", "A1": "elbow", "A2": "wrist"}
-    np.testing.assert_array_equal(read(path, names=names).runs[0].q, run.q[:, [2, 0, 1]])
-    with pytest.raises(FileError, match=r"no position of joint 'shoulder'.*measurement\.names"):
-        read(path)
-    with pytest.raises(ConfigError, match="no file has a joint 'A4'"):
-        read(write_csv(tmp_path / "b.csv", run), names={"A4": "wrist"})
-    with pytest.raises(ConfigError, match=r"does not move.*Did you mean 'elbow'"):
-        read(path, names={"A1": "elbo"})
-    with pytest.raises(ConfigError, match="two columns to 'elbow'"):
-        read(path, names={"A1": "elbow", "A2": "elbow"})
+    np.testing.assert_array_equal(read(path, names=names).runs[0].q, RUN.q[:, [2, 0, 1]])
+    refused(path, "no position of joint 'shoulder'", "measurement.names")
+    for file, wrong, words in (
+        (log, {"A4": "wrist"}, "no file has a joint 'A4'"),
+        (path, {"A1": "elbo"}, r"does not move.*Did you mean 'elbow'"),
+        (path, {"A1": "elbow", "A2": "elbow"}, "two columns to 'elbow'"),
+    ):
+        with pytest.raises(ConfigError, match=words):
+            read(file, names=wrong)
+    near = write_csv(tmp_path / "near.csv", RUN, ("shoulder", "elbow_joint", "wrist"))
+    refused(near, "joint 'elbow'", "Did you mean 'elbow_joint'")
 
 
-def test_missing_joint_names_the_nearest(tmp_path: Path) -> None:
-    path = write_csv(tmp_path / "log.csv", recorded(), ("shoulder", "elbow_joint", "wrist"))
-    with pytest.raises(FileError, match=r"joint 'elbow'.*Did you mean 'elbow_joint'"):
-        read(path)
-
-
-def test_other_joints_and_channels_are_kept(tmp_path: Path) -> None:
-    run = recorded()
-    path = write_csv(tmp_path / "log.csv", run)
-    data = read(path, "wrist", "shoulder")
+def test_other_joints_and_channels_are_kept(log: Path) -> None:
+    data = read(log, "wrist", "shoulder")
     only(data.findings, "other_joints")
-    np.testing.assert_array_equal(data.runs[0].extra["tau_elbow"], run.tau[:, 1])
-    lines = path.read_text().splitlines()
-    lines = [lines[0] + ",temperature,ref_elbow"] + [line + ",21.5,7" for line in lines[1:]]
-    path.write_text("\n".join(lines))
-    extra = read(path).runs[0].extra
+    np.testing.assert_array_equal(data.runs[0].extra["tau_elbow"], RUN.tau[:, 1])
+    head, *rows = log.read_text().splitlines()
+    rows = [f"{head},temperature,ref_elbow", *(f"{row},21.5,7" for row in rows)]
+    log.write_text("\n".join(rows))
+    extra = read(log).runs[0].extra
     assert (extra["temperature"] == 21.5).all()
     assert (extra["ref_elbow"] == 7).all()
 
 
-def test_torque_from_another_channel(tmp_path: Path) -> None:
-    run = recorded()
-    path = write_csv(tmp_path / "log.csv", run)
-    path.write_text(path.read_text().replace("tau_", "current_"))
-    back = read(path, channels={"tau": "current"}, torque="current", gear_ratio=10.0,
-                torque_constant=0.5).runs[0]  # fmt: skip
-    np.testing.assert_allclose(back.tau, 5 * run.tau)
-    with pytest.raises(FileError, match=r"no columns 'tau_<joint>'.*measurement.channels: \{tau"):
-        read(path)
-
-
-def test_speeds_left_out(tmp_path: Path) -> None:
-    back = read(write_csv(tmp_path / "log.csv", recorded()), channels={"dq": None}).runs[0]
+def test_torque_from_another_channel_and_speeds_left_out(log: Path) -> None:
+    back = read(log, channels={"dq": None}).runs[0]
     assert back.dq is None
     assert "dq_in_file" in back.extra
+    log.write_text(log.read_text().replace("tau_", "current_"))
+    scale: dict[str, Any] = {"torque": "current", "gear_ratio": 10.0, "torque_constant": 0.5}
+    back = read(log, channels={"tau": "current"}, **scale).runs[0]
+    np.testing.assert_allclose(back.tau, 5 * RUN.tau)
+    with pytest.raises(FileError, match=r"no columns 'tau_<joint>'.*measurement.channels: \{tau"):
+        read(log)
 
 
-def test_no_time_stamps(tmp_path: Path) -> None:
-    run = recorded()
-    path = write_csv(tmp_path / "log.csv", run)
-    path.write_text("\n".join(line.split(",", 1)[1] for line in path.read_text().splitlines()))
-    with pytest.raises(FileError, match=r"no time stamps 't'.*measurement\.rate"):
-        read(path)
-    np.testing.assert_allclose(read(path, rate=200.0, time="ms").runs[0].t, run.t)
+def test_no_time_stamps(log: Path) -> None:
+    log.write_text("\n".join(line.split(",", 1)[1] for line in log.read_text().splitlines()))
+    refused(log, "no time stamps 't'", "measurement.rate")
+    np.testing.assert_allclose(read(log, rate=200.0, time="ms").runs[0].t, RUN.t)
 
 
-def test_columns_of_nothing_known(tmp_path: Path) -> None:
-    rows = "Joint_1,Joint_2\n0.1,0.2\n0.1,0.3\n"
-    refused(tmp_path / "a.csv", rows, "its columns: Joint_1, Joint_2", "t, q_<joint>", "joined")
-
-
-def test_spoiled_tables(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("", ("is empty",)),
+        ("t,q_1,tau_1\n", ("no rows",)),
+        ("0,1,2\n1,2,3\n", ("has no header", "t, q_<joint>")),
+        ("t,q_1,q_1\n0,1,2\n", ("'q_1' is there twice",)),
+        ("t,,tau_1\n0,1,2\n", ("a column has no name",)),
+        ("t,q_1,tau_1\n0,1,2\n1,2\n2,3,4\n", ("line 3", "2 fields", "3 columns")),
+        ("t,q_1,tau_1\n0,1,2\n1,x7,3\n", ("line 3", "'x7' in column 'q_1'")),
+        ("t,q_1,tau_1\n" + "1" * 2**21, ("a line of more than", "MiB")),
+        ("Joint_1,Joint_2\n0.1,0.2\n0.1,0.3\n",
+         ("its columns: Joint_1, Joint_2", "t, q_<joint>", "joined")),
+        (b"\xff\xfe\x00t", ("a header and no rows",)),
+    ],
+)  # fmt: skip
+def test_spoiled_tables(tmp_path: Path, text: str | bytes, parts: tuple[str, ...]) -> None:
     path = tmp_path / "a.csv"
-    refused(path, "", "is empty")
-    refused(path, "t,q_1,tau_1\n", "no rows")
-    refused(path, "0,1,2\n1,2,3\n", "has no header", "t, q_<joint>")
-    refused(path, "t,q_1,q_1\n0,1,2\n", "'q_1' is there twice")
-    refused(path, "t,,tau_1\n0,1,2\n", "a column has no name")
-    refused(path, "t,q_1,tau_1\n0,1,2\n1,2\n2,3,4\n", "line 3", "2 fields", "3 columns")
-    refused(path, "t,q_1,tau_1\n0,1,2\n1,x7,3\n", "line 3", "'x7' in column 'q_1'")
-    path.write_bytes(b"\xff\xfe\x00t")
-    with pytest.raises(FileError, match="a header and no rows"):
-        read(path)
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    refused(path, *parts)
 
 
-def test_damaged_gzip(tmp_path: Path) -> None:
-    text = write_csv(tmp_path / "log.csv", recorded()).read_bytes()
-    path = tmp_path / "log.csv.gz"
-    for content in (gzip.compress(text)[:2000], b"no gzip at all"):
+def test_damaged_gzip(log: Path) -> None:
+    path = log.with_name("log.csv.gz")
+    for content in (gzip.compress(log.read_bytes())[:2000], b"no gzip at all"):
         path.write_bytes(content)
-        with pytest.raises(FileError, match=r"damaged or cut off \.gz"):
-            read(path)
+        refused(path, "damaged or cut off .gz")
 
 
 def test_empty_fields_words_and_a_cut_row(tmp_path: Path) -> None:
-    path = write_csv(tmp_path / "log.csv", without_speed(recorded()))
-    lines = path.read_text().splitlines()
-    lines = [lines[0] + ",mode"] + [line + ",auto" for line in lines[1:]]
-    fields = lines[100].split(",")
-    lines[100] = ",".join([*fields[:4], "", *fields[5:]])
-    path.write_text("\n".join(lines) + "\n7.9,0.1")
+    path = write_csv(tmp_path / "log.csv", without_speed(RUN))
+    head, *rows = path.read_text().splitlines()
+    rows = [f"{row},auto" for row in rows]
+    fields = rows[99].split(",")
+    rows[99] = ",".join([*fields[:4], "", *fields[5:]])
+    path.write_text("\n".join([f"{head},mode", *rows]) + "\n7.9,0.1")
     data = read(path)
     assert [found.kind for found in data.findings] == ["truncated", "words", "nan_torque"]
-    assert len(data.runs[0].t) == 1600
     valid = data.runs[0].usable()
-    assert not valid[99, 0]
-    assert np.count_nonzero(~valid) == 1
-
-
-def test_too_long_a_line(tmp_path: Path) -> None:
-    refused(tmp_path / "a.csv", "t,q_1,tau_1\n" + "1" * 2**21, "MiB")
+    assert valid.shape == (1600, len(JOINTS))
+    assert np.argwhere(~valid).tolist() == [[99, 0]]
 
 
 @settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture],
@@ -200,9 +172,7 @@ def test_too_long_a_line(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_any_numbers_survive(tmp_path: Path, table: np.ndarray, separator: str) -> None:
     path = tmp_path / "any.csv"
-    rows = [separator.join(["a", "b", "c"])] + [
-        separator.join(map(repr, r)) for r in table.tolist()
-    ]
-    path.write_text("\n".join(rows))
+    rows = [["a", "b", "c"], *(map(repr, row) for row in table.tolist())]
+    path.write_text("\n".join(map(separator.join, rows)))
     back = np.column_stack(list(read_table(path).columns.values()))
     np.testing.assert_array_equal(back, table)

@@ -8,11 +8,15 @@ import h5py
 import numpy as np
 import pytest
 
+from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import FileError
+from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Dataset
+from excite_cli.measurement.foreign_hdf5 import attribute
 from excite_cli.measurement.hdf5_writer import write_dataset
 from excite_cli.measurement.reader import MAX_VALUES
-from tests.measurement.recordings import JOINTS, only, read, recorded, without_speed
+from excite_cli.store.fit_file import is_fit, read_fit
+from tests.measurement.recordings import JOINTS, only, read, recorded, refused, without_speed
 
 
 def flat(path: Path, names: Any = JOINTS) -> Path:
@@ -23,13 +27,6 @@ def flat(path: Path, names: Any = JOINTS) -> Path:
         if names is not None:
             file.attrs["joint_names"] = list(names)
     return path
-
-
-def refused(path: Path, *parts: str, **declared: Any) -> None:
-    with pytest.raises(FileError) as caught:
-        read(path, **declared)
-    for part in (str(path), *parts):
-        assert part in str(caught.value)
 
 
 def test_written_data_come_back(tmp_path: Path) -> None:
@@ -60,9 +57,6 @@ def test_names_decide_not_positions(tmp_path: Path) -> None:
     back = read(path).runs[0]
     assert back.name == "log"
     np.testing.assert_array_equal(back.q, recorded().q[:, [1, 2, 0]])
-
-
-def test_no_joint_names(tmp_path: Path) -> None:
     refused(flat(tmp_path / "a.h5", None), "joint_names", "never by position alone", ".attrs[")
     refused(flat(tmp_path / "a.h5", ["x", "x", "y"]), "different names")
     refused(flat(tmp_path / "a.h5", [1.0, 2.0, 3.0]), "as text")
@@ -83,22 +77,37 @@ def test_wrong_contents(tmp_path: Path) -> None:
         ("q", recorded().q.T, ("(3, 1600)",)),
         ("tau", recorded().tau.T, ("(3, 1600)", "transposed")),
         ("q", "words", ("does not hold numbers",)),
+        ("q", np.zeros(1600, [("a", "f8")]), ("does not hold numbers",)),
+        ("q", np.full((1600, 3), b"text"), ("does not hold numbers",)),
+        ("q", np.zeros((1600, 3), complex), ("does not hold numbers",)),
         ("q", np.zeros((1600, 3, 2)), ("(1600, 3, 2)",)),
         ("t", None, ("no time stamps 't'", "measurement.rate")),
     ):
         path = flat(tmp_path / "a.h5")
         _replace(path, name, value)
         refused(path, *parts)
-
-
-def test_rate_in_place_of_stamps(tmp_path: Path) -> None:
-    path = flat(tmp_path / "a.h5")
-    _replace(path, "t", None)
     np.testing.assert_allclose(read(path, rate=200.0).runs[0].t, recorded().t)
 
 
-@pytest.mark.parametrize("kind", ["external", "soft", "external file", "virtual", "runs"])
-def test_links_and_foreign_storage_are_refused(tmp_path: Path, kind: str) -> None:
+def test_torques_are_not_missed_where_only_the_base_has_rows(tmp_path: Path) -> None:
+    path = flat(tmp_path / "a.h5")
+    _replace(path, "tau", None)
+    (run,) = read_dataset([path], MeasurementSpec(), JOINTS, rows=("base",)).runs
+    np.testing.assert_array_equal(run.q, recorded().q)
+    assert not run.usable().any()
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("external", "is a link"),
+        ("soft", "is a link"),
+        ("external file", "keeps its data in other files"),
+        ("virtual", "keeps its data in other files"),
+        ("runs", "is a link"),
+    ],
+)
+def test_links_and_foreign_storage_are_refused(tmp_path: Path, kind: str, words: str) -> None:
     other = flat(tmp_path / "other.h5")
     path = flat(tmp_path / "a.h5")
     with h5py.File(path, "a") as file:
@@ -115,7 +124,7 @@ def test_links_and_foreign_storage_are_refused(tmp_path: Path, kind: str) -> Non
             file.create_virtual_dataset("tau", layout)
         else:
             file["runs"] = h5py.ExternalLink(str(other), "/")
-    refused(path, "only data in the file itself")
+    refused(path, words, "only data in the file itself")
 
 
 def test_giant_shapes_are_refused_unread(tmp_path: Path) -> None:
@@ -149,3 +158,29 @@ def test_what_is_no_channel_is_said(tmp_path: Path) -> None:
     (found,) = read(path).findings
     assert found.kind == "left_out"
     assert "alias, comment" in found.text
+
+
+def with_lists(path: Path, name: str) -> Path:
+    """A file with an attribute of lists, which end the process where they are damaged."""
+    lists = np.empty(2, dtype=object)
+    lists[:] = [np.arange(3), np.arange(2)]
+    with h5py.File(path, "a") as file:
+        file.attrs.pop(name, None)
+        file.attrs.create(name, lists, dtype=h5py.vlen_dtype(np.dtype("i4")))
+    return path
+
+
+def test_attributes_that_are_neither_numbers_nor_texts_are_not_read(tmp_path: Path) -> None:
+    kept = {"names": ["a", "b"], "fixed": np.array([b"a", b"b"]), "count": 3, "good": True}
+    with h5py.File(with_lists(tmp_path / "a.h5", "lists"), "a") as file:
+        file.attrs.update(kept)
+        for name, value in kept.items():
+            assert np.array_equal(attribute(file, name), value)
+        assert attribute(file, "none", "here") == "here"
+        with pytest.raises(ValueError, match="'lists' holds neither numbers nor texts"):
+            attribute(file, "lists")
+    refused(with_lists(flat(tmp_path / "log.h5"), "joint_names"), "neither numbers nor texts")
+    fit = with_lists(tmp_path / "fit.h5", "content")
+    assert not is_fit(fit)
+    with pytest.raises(FileError, match="neither numbers nor texts"):
+        read_fit(fit)

@@ -11,6 +11,7 @@ import pytest
 from excite_cli.errors import FileError
 from excite_cli.measurement import motion_reader
 from excite_cli.measurement.motion_files import motion_reader_for, read_motion
+from excite_cli.measurement.timed_motion import TimedMotion
 
 POINT = "{positions: [1, 2.5], time_from_start: {sec: 0, nanosec: 0}}"
 LATER = "{positions: [2, 1e-05], time_from_start: {sec: 1, nanosec: 500000000}}"
@@ -23,13 +24,15 @@ def _file(folder: Path, name: str, text: str) -> Path:
     return path
 
 
+def _read(folder: Path, name: str, text: str, *joints: str) -> tuple[TimedMotion, str]:
+    return read_motion(_file(folder, name, text), joints or ("a",))
+
+
 def test_a_hand_made_table_is_a_motion_and_one_with_torques_is_not(tmp_path: Path) -> None:
-    path = _file(tmp_path, "m.csv", "t,q_b,q_a,note\n0,1,2,x\n0.5,3,4,y\n")
-    motion, note = read_motion(path, ("a", "b"))
+    table = "t,q_b,q_a,note\n0,1,2,x\n0.5,3,4,y\n"
+    motion, note = _read(tmp_path, "m.csv", table, "a", "b")
     assert motion.q.tolist() == [[2, 1], [4, 3]]
-    assert motion.v is None
-    assert motion.a is None
-    assert note == ""
+    assert (motion.v, motion.a, note) == (None, None, "")
     measured = _file(tmp_path, "d.csv", "t,q_a,tau_a\n0,1,2\n1,2,2\n")
     assert motion_reader_for(measured) is None
     current = _file(tmp_path, "c.csv", "t,q_a,current_a\n0,1,2\n1,2,2\n")
@@ -38,27 +41,25 @@ def test_a_hand_made_table_is_a_motion_and_one_with_torques_is_not(tmp_path: Pat
 
 
 def test_joints_beyond_the_robots_are_named_and_numbers_go_by_order(tmp_path: Path) -> None:
-    path = _file(tmp_path, "m.csv", "t;q_a;q_grip\n0;1;9\n0.5;3;9\n")
-    motion, note = read_motion(path, ("a",))
+    motion, note = _read(tmp_path, "m.csv", "t;q_a;q_grip\n0;1;9\n0.5;3;9\n")
     assert motion.q.ravel().tolist() == [1, 3]
     assert note == "joints that the robot does not move are left out: grip"
-    path = _file(tmp_path, "n.csv", "t,q10,q2,dq10,dq2\n0,1,2,0,0\n1,3,4,0,0\n")
-    motion, note = read_motion(path, ("a", "b"))
+    table = "t,q10,q2,dq10,dq2\n0,1,2,0,0\n1,3,4,0,0\n"
+    motion, note = _read(tmp_path, "n.csv", table, "a", "b")
     assert motion.q.tolist() == [[2, 1], [4, 3]]
     assert note.endswith("taken in the robot's order: 2 is a, 10 is b")
 
 
 def test_yaml_and_json_of_a_message(tmp_path: Path) -> None:
-    motion, _ = read_motion(_file(tmp_path, "m.yaml", GOOD + "---\n"), ("b", "a"))
+    motion, _ = _read(tmp_path, "m.yaml", GOOD + "---\n", "b", "a")
     assert motion.q.tolist() == [[2.5, 1], [1e-5, 2]]
-    assert motion.t.tolist() == [0, 1.5]
-    assert motion.v is None
+    assert (motion.t.tolist(), motion.v) == ([0, 1.5], None)
     points = [
         {"positions": [k], "velocities": [0], "time_from_start": {"secs": k, "nsecs": 1}}
         for k in range(3)
     ]
     text = json.dumps({"joint_trajectory": {"joint_names": ["a"], "points": points}})
-    motion, _ = read_motion(_file(tmp_path, "m.json", text), ("a",))
+    motion, _ = _read(tmp_path, "m.json", text)
     assert motion.t.tolist() == [1e-9, 1.000000001, 2.000000001]
     assert motion.v is not None
 
@@ -101,24 +102,20 @@ def test_yaml_and_json_of_a_message(tmp_path: Path) -> None:
     ],
 )
 def test_bad_files(tmp_path: Path, name: str, text: str, words: str) -> None:
-    path = _file(tmp_path, name, text)
     with pytest.raises(FileError) as caught:
-        read_motion(path, ("a", "b") if "q_b" in text or "[a, b]" in text else ("a",))
+        _read(tmp_path, name, text, *("a", "b") if "q_b" in text or "[a, b]" in text else ("a",))
     assert words in str(caught.value)
-    assert str(path) in str(caught.value)
+    assert str(tmp_path / name) in str(caught.value)
 
 
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="There is no file"):
-        read_motion(tmp_path / "m.csv", ("a",))
-
-
-def test_texts_beyond_the_limit_are_not_opened(
+def test_files_that_are_not_there_or_too_large(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    with pytest.raises(FileError, match="There is no file"):
+        read_motion(tmp_path / "m.csv", ("a",))
     monkeypatch.setattr(motion_reader, "MAX_TEXT", 20)
     with pytest.raises(FileError, match="Take CSV or"):
-        read_motion(_file(tmp_path, "m.yaml", GOOD), ("a", "b"))
+        _read(tmp_path, "m.yaml", GOOD, "a", "b")
 
 
 def _npz(path: Path, **arrays: object) -> Path:
@@ -129,8 +126,8 @@ def _npz(path: Path, **arrays: object) -> Path:
 
 def test_npz_archives(tmp_path: Path) -> None:
     good = {"t": [0, 1], "q": [[1.0], [2.0]], "joint_names": ["a"]}
-    motion, _ = read_motion(_npz(tmp_path / "m.npz", **good), ("a",))
-    assert motion.q.tolist() == [[1], [2]]
+    path = _npz(tmp_path / "m.npz", **good)
+    assert read_motion(path, ("a",))[0].q.tolist() == [[1], [2]]
     bad: list[tuple[dict[str, object], str]] = [
         ({**good, "joint_names": np.array(["a"], dtype=object)}, "Pickles are never opened"),
         ({**good, "q": np.array([[None], [None]])}, "Pickles are never opened"),
@@ -141,14 +138,10 @@ def test_npz_archives(tmp_path: Path) -> None:
     for arrays, words in bad:
         with pytest.raises(FileError, match=words):
             read_motion(_npz(tmp_path / "bad.npz", **arrays), ("a",))
-
-
-def test_an_npz_that_claims_more_than_it_holds(tmp_path: Path) -> None:
-    path = _npz(tmp_path / "m.npz", t=[0.0, 1.0], q=[[1.0], [2.0]], joint_names=["a"])
     header = io.BytesIO()
     claim = {"descr": "<f8", "fortran_order": False, "shape": (10**13, 1)}
     np.lib.format.write_array_header_1_0(header, claim)
-    big = tmp_path / "big.npz"
+    big = tmp_path / "big.npz"  # it claims more than it holds
     with zipfile.ZipFile(path) as old, zipfile.ZipFile(big, "w") as new:
         for name in old.namelist():
             new.writestr(name, header.getvalue() if name == "q.npy" else old.read(name))
@@ -158,9 +151,11 @@ def test_an_npz_that_claims_more_than_it_holds(tmp_path: Path) -> None:
 
 def test_way_points_with_stops_are_no_contradiction(tmp_path: Path) -> None:
     """Speeds of zero at every way point: a program that stops there."""
-    rows = "\n".join(f"{k},{k % 2},0" for k in range(80))
-    motion, _ = read_motion(_file(tmp_path, "m.csv", f"t,q_a,dq_a\n{rows}\n"), ("a",))
-    assert motion.v is not None
-    rows = "\n".join(f"{k},{k % 2},{3 * (k % 2)}" for k in range(80))
+
+    def with_speeds(most: int) -> TimedMotion:
+        rows = "\n".join(f"{k},{k % 2},{most * (k % 2)}" for k in range(80))
+        return _read(tmp_path, "m.csv", f"t,q_a,dq_a\n{rows}\n")[0]
+
+    assert with_speeds(0).v is not None
     with pytest.raises(FileError, match="the speeds of 'a' are not those of its positions"):
-        read_motion(_file(tmp_path, "n.csv", f"t,q_a,dq_a\n{rows}\n"), ("a",))
+        with_speeds(3)

@@ -11,11 +11,12 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
-from excite_cli.api.loading import load_data
 from excite_cli.errors import FileError, MissingExtraError
 from excite_cli.measurement.dataset import Array
 from excite_cli.measurement.run_identity import Origin
-from tests.measurement.test_formats import JOINTS, PLAIN, TAU, Q, T, assert_same, case, read
+from tests.measurement import recordings
+from tests.measurement.recordings import refused
+from tests.measurement.test_formats import JOINTS, PLAIN, TAU, Q, T, assert_same, read
 
 
 def lists(values: Array) -> Any:
@@ -73,7 +74,7 @@ LAYOUTS: dict[str, dict[str, tuple[Any, Array]]] = {
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_lerobot(tmp_path: Path, layout: str) -> None:
     write_dataset(tmp_path / "set", LAYOUTS[layout])
-    assert_same(read(tmp_path, "set/data/chunk-000/file-000.parquet", time="ms"))
+    assert_same(read(tmp_path / "set/data/chunk-000/file-000.parquet", time="ms"))
 
 
 def test_a_new_process_reads_within_the_limit_of_memory(tmp_path: Path) -> None:
@@ -90,71 +91,64 @@ def test_a_new_process_reads_within_the_limit_of_memory(tmp_path: Path) -> None:
 @pytest.mark.parametrize("one_file", [True, False])
 def test_every_episode_is_a_run(tmp_path: Path, one_file: bool) -> None:
     path = write_dataset(tmp_path / "set", LAYOUTS["torques in the state"], 3, one_file)
-    data = load_data(case(tmp_path), tmp_path / "set", tell=lambda note: None)
+    data = recordings.read(tmp_path / "set", *JOINTS)
     assert [run.name for run in data.runs] == [f"episode_{k:06d}" for k in range(3)]
     for run in data.runs:
-        assert_same((run.t, run.q, run.tau))
-    single = load_data(case(tmp_path), path, tell=lambda note: None)
+        assert_same(run)
+    single = recordings.read(path, *JOINTS)
     assert len(single.runs) == (3 if one_file else 1)
     assert single.runs[0].origin == Origin(str(path), "episode_index 0")
 
 
-def test_a_plain_table_is_named_as_a_csv(tmp_path: Path) -> None:
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    return tmp_path / "a.parquet"
+
+
+def plain(*columns: Any, names: list[str] = PLAIN) -> pa.Table:
+    return pa.table(dict(zip(names, columns, strict=True)))
+
+
+def test_a_plain_table_is_named_as_a_csv(log: Path) -> None:
     stamps = pa.array((T * 1e6 + 1.75e15).astype("i8"), pa.timestamp("us"))
     names = ["t", "q_base [deg]", "q_elbow [deg]", *PLAIN[3:]]
-    columns = [stamps, *np.degrees(Q).T, *TAU.T]
-    parquet.write_table(pa.table(dict(zip(names, columns, strict=True))), tmp_path / "a.parquet")
-    assert_same(read(tmp_path, "a.parquet"))
+    parquet.write_table(plain(stamps, *np.degrees(Q).T, *TAU.T, names=names), log)
+    assert_same(read(log))
     arrays = {"t": T, "q": lists(Q), "tau": lists(TAU), "note": ["warm"] * len(T)}
-    parquet.write_table(pa.table(arrays), tmp_path / "b.parquet")
-    assert_same(read(tmp_path, "b.parquet"))
-
-
-def test_missing_values_are_known(tmp_path: Path) -> None:
-    spoiled = np.where(np.arange(len(T)) == 7, np.nan, Q[:, 0])
-    columns = [T, pa.array(spoiled, from_pandas=True), Q[:, 1], *TAU.T]
-    parquet.write_table(pa.table(dict(zip(PLAIN, columns, strict=True))), tmp_path / "a.parquet")
-    _, q, _ = read(tmp_path, "a.parquet")
-    assert len(q) == len(T)
-    (run,) = load_data(case(tmp_path), tmp_path / "a.parquet", tell=lambda note: None).runs
+    parquet.write_table(pa.table(arrays), log)
+    assert_same(read(log))
+    spoiled = pa.array(np.where(np.arange(len(T)) == 7, np.nan, Q[:, 0]), from_pandas=True)
+    parquet.write_table(plain(T, spoiled, Q[:, 1], *TAU.T), log)
+    run = read(log)
+    assert len(run.q) == len(T)
     assert not run.usable()[7, 0]
 
 
-def test_a_wrong_file_gets_one_sentence(tmp_path: Path) -> None:
-    (tmp_path / "a.parquet").write_bytes(b"no such thing")
-    with pytest.raises(FileError, match=r"a\.parquet is not a readable parquet file"):
-        read(tmp_path, "a.parquet")
-    parquet.write_table(pa.table({"t": T, "pos": Q[:, 0]}), tmp_path / "a.parquet")
-    with pytest.raises(FileError, match=r"no columns 'q_<joint>'; its columns: t, pos"):
-        read(tmp_path, "a.parquet")
+def test_a_wrong_file_gets_one_sentence(log: Path) -> None:
+    log.write_bytes(b"no such thing")
+    refused(log, "a.parquet is not a readable parquet file")
+    parquet.write_table(pa.table({"t": T, "pos": Q[:, 0]}), log)
+    refused(log, "no columns 'q_<joint>'; its columns: t, pos")
     for useless in (["warm"], [[1.0], [1.0, 2.0]], pa.array([], pa.float64())):
-        parquet.write_table(pa.table({"note": useless}), tmp_path / "a.parquet")
-        with pytest.raises(FileError, match="has no rows of numbers; its columns: note"):
-            read(tmp_path, "a.parquet")
+        parquet.write_table(pa.table({"note": useless}), log)
+        refused(log, "has no rows of numbers; its columns: note")
+    zeros = pa.array(np.zeros(2**25, "i1"))  # they are not unpacked
+    parquet.write_table(pa.table({"t": zeros}), log, compression="zstd")
+    assert log.stat().st_size < 200_000
+    refused(log, "made to fill the memory")
 
 
 def test_what_lacks_in_lerobots_files_is_said(tmp_path: Path) -> None:
     """Most arms of LeRobot record no torques."""
     path = write_dataset(tmp_path / "set", {"observation.state": (TURNED, Q[:, ::-1])}, 2)
-    with pytest.raises(FileError, match=r"has no torques; it has: q_elbow, q_base, t\."):
-        read(tmp_path, "set")
+    refused(tmp_path / "set", "has no torques; it has: q_elbow, q_base, t.")
     (tmp_path / "set" / "meta" / "info.json").write_text("[" * 100_000)
     with pytest.raises(FileError, match=r"info\.json does not describe LeRobot's columns"):
-        read(tmp_path, str(path))
+        read(path)
 
 
-def test_packed_zeros_are_refused_unread(tmp_path: Path) -> None:
-    zeros = pa.array(np.zeros(2**25, "i1"))
-    parquet.write_table(pa.table({"t": zeros}), tmp_path / "a.parquet", compression="zstd")
-    assert (tmp_path / "a.parquet").stat().st_size < 200_000
-    with pytest.raises(FileError, match="made to fill the memory"):
-        read(tmp_path, "a.parquet")
-
-
-def test_without_pyarrow_there_is_one_message(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    parquet.write_table(pa.table({"t": T}), tmp_path / "a.parquet")
+def test_without_pyarrow_there_is_one_message(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    parquet.write_table(pa.table({"t": T}), log)
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
     with pytest.raises(MissingExtraError, match=r"pip install 'excite-cli\[parquet\]'"):
-        read(tmp_path, "a.parquet")
+        read(log)

@@ -1,16 +1,13 @@
 """Logs of real robots: no error is found in them, and what is known of them comes out."""
 
-import gzip
-import xml.etree.ElementTree as ElementTree
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 
-from excite_cli.config.data_spec import MeasurementSpec
-from excite_cli.errors import FileError
-from excite_cli.measurement.catalogue import read_dataset
+from excite_cli.api.loading import as_recorded, load_case
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.quality import raise_for_errors
 from excite_cli.measurement.speed_lag import speed_lag
@@ -23,23 +20,15 @@ ROBOTS = {
 }
 
 
-def joints_of(robot: str) -> tuple[str, ...]:
+def of(robot: str, key: str) -> list[Any]:
     with h5py.File(LOGS / robot / ROBOTS[robot][0]) as file:
-        return tuple(name.decode() for name in file.attrs["joint_names"])
+        return list(file.attrs[key])
 
 
-def load(robot: str, name: str | None = None, **declared: object) -> Dataset:
-    joints = joints_of(robot)
-    tree = ElementTree.parse(LOGS / robot / ROBOTS[robot][1]).getroot()
-    limits, keys = [], ("lower", "upper", "velocity", "effort")
-    for joint in joints:
-        limit = tree.find(f"joint[@name='{joint}']/limit")
-        assert limit is not None
-        limits.append([float(limit.get(key, "nan")) for key in keys])
-    columns = np.array(limits).T
-    path = LOGS / robot / (name or ROBOTS[robot][0])
-    spec = MeasurementSpec(**declared)  # type: ignore[arg-type]
-    return read_dataset([path], spec, joints, (columns[0], columns[1], columns[2], columns[3]))
+def load(robot: str, name: str = "", **declared: Any) -> Dataset:
+    file, urdf = ROBOTS[robot]
+    spec = {"robot": {"urdf": str(LOGS / robot / urdf)}, "measurement": declared}
+    return as_recorded(load_case(spec), LOGS / robot / (name or file))
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
@@ -58,16 +47,25 @@ def test_names_and_channels() -> None:
     assert [speed_lag(run) for run in data.runs] == pytest.approx([0.004] * 3, abs=5e-4)
 
 
-@pytest.mark.parametrize("robot", ["kr300", "tx40"])
+def ratios(robot: str) -> dict[str, float]:
+    names = [name.decode() for name in of(robot, "joint_names")]
+    return dict(zip(names, map(float, of(robot, "gear_ratios")), strict=True))
+
+
+AT_MOTORS: dict[str, dict[str, Any]] = {
+    "kr300": {"torque": "motor", "channels": {"tau": "tau_motor"}},
+    "tx40": {  # with encoders, and the wrist's coupled
+        "torque": "motor",
+        "position": "motor",
+        "coupling": {"joint_5": {"joint_6": 1.0}},
+        "channels": {"tau": "tau_motor", "q": "q_motor"},
+    },
+}
+
+
+@pytest.mark.parametrize("robot", AT_MOTORS)
 def test_motor_torque_leads_to_joint_torque(robot: str) -> None:
-    joints = joints_of(robot)
-    with h5py.File(LOGS / robot / ROBOTS[robot][0]) as file:
-        ratio = dict(zip(joints, map(float, file.attrs["gear_ratios"]), strict=True))
-    coupling = {"joint_5": {"joint_6": 1.0}} if robot == "tx40" else {}
-    named = {"tau": "tau_motor"} | ({"q": "q_motor"} if robot == "tx40" else {})
-    position = "motor" if robot == "tx40" else "link"
-    there = load(robot, torque="motor", position=position, gear_ratio=ratio, coupling=coupling,
-                 channels=named)  # fmt: skip
+    there = load(robot, gear_ratio=ratios(robot), **AT_MOTORS[robot])
     for run, known in zip(there.runs, load(robot).runs, strict=True):
         scale = np.abs(known.tau).max(axis=0)
         assert (np.abs(run.tau - known.tau).max(axis=0) / scale).max() < 1e-4
@@ -82,27 +80,3 @@ def test_bag_and_hdf5_of_the_same_recording() -> None:
     assert known.dq is not None
     np.testing.assert_allclose(bag.dq, known.dq, rtol=1e-6, atol=1e-7)  # stored in single
     np.testing.assert_allclose(bag.tau, known.tau, rtol=1e-6, atol=1e-5)
-
-
-def test_motor_side_tables_say_what_they_need(tmp_path: Path) -> None:
-    with pytest.raises(
-        FileError, match=r"its columns: Joint_1, .*joined with those of the other files"
-    ):
-        load("tx40", "curr_data.csv.gz")
-    # Joined, as the message says: columns with their channel's name, and the rate declared.
-    tables = [
-        gzip.decompress((LOGS / "tx40" / name).read_bytes()).decode().splitlines()[:5001]
-        for name in ("pos_read_data.csv.gz", "curr_data.csv.gz")
-    ]
-    header = ",".join(f"{c}_{j}" for c in ("q", "tau") for j in range(1, 7))
-    rows = [",".join(pair) for pair in zip(tables[0][1:], tables[1][1:], strict=True)]
-    path = tmp_path / "joined.csv"
-    path.write_text("\n".join([header, *rows]))
-    ratio = dict(zip(joints_of("tx40"), (32.0, 32.0, 45.0, -48.0, 45.0, 32.0), strict=True))
-    spec = MeasurementSpec(rate=5000, torque="motor", position="motor", gear_ratio=ratio,
-                           coupling={"joint_5": {"joint_6": 1.0}})  # fmt: skip
-    data = read_dataset([path], spec, joints_of("tx40"))
-    assert [found.severity for found in data.findings] == ["note"], data.findings
-    joined, known = data.runs[0], load("tx40").runs[0]
-    same = joined.q[::5] - joined.q[0], known.q[:1000] - known.q[0]
-    assert np.abs(same[0] - same[1]).max() < 5e-3

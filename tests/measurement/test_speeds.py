@@ -8,6 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 from excite_cli.measurement.dataset import Run
+from excite_cli.measurement.speeds import check_clock
 from tests.measurement.recordings import check, motion, only, read, recorded, write_csv
 
 
@@ -51,3 +52,23 @@ def test_a_delay_is_no_filter() -> None:
     run = recorded()
     late = replace(run, dq=motion(run.t - 0.04)[1])
     assert "40 ms after" in only(check(late)[1], "lag").text
+
+
+def clocked(step: float, gain: float) -> Run:
+    """Two joints, the second faster, with a sample every `step` and speeds too large by `gain`."""
+    k, period = np.arange(400), np.array([200.0, 130.0])
+    phase = 2.0 * np.pi * k[:, None] / period
+    dq = gain * np.cos(phase) * 2.0 * np.pi / (period * step)
+    return Run("a", step * k, np.sin(phase), np.zeros((400, 2)), dq)
+
+
+def test_only_one_factor_on_all_joints_is_a_clock() -> None:
+    (found,) = check_clock([clocked(0.01, 1.05)], "a")
+    assert "measurement.clock: 0.95" in found.text
+    (found,) = check_clock([clocked(1.0, 100.0)], "a")  # stamps that count samples
+    assert found.severity == "error"
+    assert found.settings == {"measurement.clock": pytest.approx(0.01)}
+    # Steps of which 0.1 s hold more than a number can say, as of damaged stamps.
+    tiny = replace(clocked(0.01, 1.0), t=1e-310 * np.arange(400))
+    for none in (clocked(0.01, 1.0), clocked(0.01, 0.0), clocked(0.7, 100.0), tiny):
+        assert check_clock([none], "a") == []

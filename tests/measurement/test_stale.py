@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from excite_cli.measurement.dataset import Run
+from excite_cli.measurement.moving import moves
 from excite_cli.measurement.stuck import mask_stuck
 from tests.measurement.recordings import JOINTS, check, recorded, without_speed
 
@@ -58,31 +59,24 @@ def test_nothing_is_stale_where_nothing_moves(made: Callable[[int], Run], seed: 
         assert back.valid is None
 
 
-def _freezing(at: int) -> Run:
+def _frozen(run: Run, at: int) -> Run:
     """Row `at` is repeated up to the end."""
-    run = without_speed(recorded())
     held = np.minimum(np.arange(len(run.t)), at)
-    return replace(run, q=run.q[held], tau=run.tau[held])
-
-
-def _stopping() -> Run:
-    """A motion that slows down to rest; then nothing changes any more."""
-    run = without_speed(recorded())
-    pace = np.clip((1200 - np.arange(len(run.t))) / 600, 0.0, 1.0)
-    clock = np.cumsum(pace) / 200.0
-    q = np.column_stack([np.interp(clock, run.t, column) for column in run.q.T])
-    held = np.minimum(np.arange(len(run.t)), 1200)
-    return replace(run, q=q[held], tau=run.tau[held])
+    return replace(run, q=run.q[held], tau=run.tau[held], dq=None)
 
 
 def test_a_robot_that_comes_to_rest_is_not_stale() -> None:
-    assert mask_stuck(_stopping(), JOINTS)[1] == []
+    """The motion slows down; then nothing changes any more."""
+    run = recorded()
+    clock = np.cumsum(np.clip((1200 - np.arange(len(run.t))) / 600, 0.0, 1.0)) / 200.0
+    q = np.column_stack([np.interp(clock, run.t, column) for column in run.q.T])
+    assert mask_stuck(_frozen(replace(run, q=q), 1200), JOINTS)[1] == []
 
 
 @pytest.mark.parametrize("at", [899, 1000, 1580])
 @pytest.mark.parametrize("count", [0.0, COUNT, 1e-3])
 def test_a_record_that_freezes_in_motion_is(at: int, count: float) -> None:
-    run = _freezing(at)
+    run = _frozen(recorded(), at)
     if count:
         run = replace(run, q=count * np.round(run.q / count))
     back, findings = mask_stuck(run, JOINTS)
@@ -102,3 +96,20 @@ def test_a_torque_that_is_constant_where_an_encoder_flickers_is_no_dead_channel(
     assert [(found.kind, found.severity) for found in findings] == [("held", "warning")]
     assert not runs[1].usable()[:, 1].any()
     assert runs[1].usable()[:, [0, 2]].all()
+
+
+def both_move(*columns: np.ndarray) -> list[bool]:
+    return moves(np.column_stack(columns), 150, 250).tolist()
+
+
+def test_what_moves_and_what_only_flickers() -> None:
+    """Seven counts of the same way are within what noise can do, thirty are not."""
+    k, rng = np.arange(400), np.random.default_rng(0)
+    count = 1e-3  # rad of the encoder
+    flicker = count * (k % 7 < 3)
+    assert both_move(count * np.floor(k / 40), flicker) == [False, False]
+    assert both_move(count * np.floor(k / 10), flicker) == [True, False]
+    # A slow wave and noise, both as wide as a few of their steps.
+    wave, noise = np.sin(2 * np.pi * k / 15), rng.normal(size=len(k))
+    assert both_move(wave, noise, 0.0 * k) == [True, False, False]
+    assert moves(np.zeros((1, 2)), 0, 1).tolist() == [False, False]  # of one sample

@@ -1,6 +1,8 @@
-from dataclasses import dataclass
+import shutil
+from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import pytest
 
 from excite_cli import diagnose, identify, load_problem, plan, save_fit, simulate
@@ -9,27 +11,41 @@ from excite_cli.measurement.hdf5_writer import write_dataset
 SMOKE = Path(__file__).resolve().parents[2] / "configs" / "smoke.yaml"
 
 
-@dataclass(frozen=True)
+Edit = Callable[[h5py.File], None]
+# A robot whose description computes its mass, with more before its links.
+XACRO = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="arm">{more}<link name="base"/>
+<link name="l"><inertial><mass value="{mass}"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="j" type="revolute"><parent link="base"/><child link="l"/>
+<limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
+
+
 class Loop:
     """The files of one short loop on the small arm."""
 
-    folder: Path
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.result, self.data = folder / "result.h5", folder / "data.h5"
+        self.fit, self.diagnosis = folder / "fit.h5", folder / "diagnosis.h5"
 
-    @property
-    def result(self) -> Path:
-        return self.folder / "result.h5"
 
-    @property
-    def data(self) -> Path:
-        return self.folder / "data.h5"
+def edited(source: Path, target: Path, edit: Edit) -> Path:
+    """A copy in which something was changed."""
+    shutil.copy(source, target)
+    with h5py.File(target, "r+") as file:
+        edit(file)
+    return target
 
-    @property
-    def fit(self) -> Path:
-        return self.folder / "fit.h5"
 
-    @property
-    def diagnosis(self) -> Path:
-        return self.folder / "diagnosis.h5"
+def config_with(old: str, new: str) -> Edit:
+    """Changes words of the stored config."""
+
+    def edit(file: h5py.File) -> None:
+        text = file.attrs["config"]
+        assert old in text
+        file.attrs["config"] = text.replace(old, new)
+
+    return edit
 
 
 @pytest.fixture(scope="session")

@@ -14,6 +14,13 @@ def excite(*arguments: str | Path) -> CompletedProcess[str]:
     return call([*map(str, arguments)], Path.cwd(), dict(os.environ), _PATIENCE)
 
 
+def done(*arguments: str | Path) -> CompletedProcess[str]:
+    """The same of what must end well."""
+    ended = excite(*arguments)
+    assert ended.returncode == 0, (ended.stderr, arguments)
+    return ended
+
+
 def refused(*arguments: str | Path) -> str:
     """The sentence with which the program refuses."""
     ended = excite(*arguments)

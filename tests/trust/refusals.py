@@ -12,14 +12,16 @@ from benchmarks.trust.fuzz_trial import Fuzzer, Verdict, attempt
 MOST_GROWTH = 350 * 2**20
 
 
-class _Entry(Fuzzer):
+class Entry(Fuzzer):
+    """Only entered: nothing is made for it."""
+
     name = "entry"
 
     def __init__(self, enter: Callable[[Path], Any]) -> None:
         self._enter = enter
 
     def make(self, rng: Any, folder: Path) -> tuple[Path, str]:
-        raise AssertionError("this one is only entered: nothing is made for it")
+        raise AssertionError(self.__doc__)
 
     def enter(self, path: Path) -> None:
         self._enter(path)
@@ -37,7 +39,7 @@ def refused(enter: Callable[[Path], Any], path: Path) -> str:
             raise
 
     before = _resident()
-    verdict: Verdict = attempt(_Entry(entered), path, 0, "")
+    verdict: Verdict = attempt(Entry(entered), path, 0, "")
     assert verdict.end == "refused", verdict
     assert verdict.memory - before < MOST_GROWTH, (verdict, before)
     return told[0]

@@ -16,20 +16,25 @@ from excite_cli.robot.description import load_description
 from excite_cli.robot.mesh_paths import Kind, check_mesh_paths, located
 from excite_cli.robot.package_search import load_with_folders
 from excite_cli.robot.srdf import srdf_near
+from tests.trust.conftest import XACRO
 
 STL = VALID["stl"]
-XACRO = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="arm">{0}<link name="base"/>
-<link name="l"><inertial><mass value="1"/>
-<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="j" type="revolute"><parent link="base"/><child link="l"/>
-<limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
 SECRET = '<robot><link name="secret"/></robot>'
 
 
+def xacro(more: str) -> str:
+    return XACRO.format(mass=1, more=more)
+
+
 @pytest.fixture
-def robot(tmp_path: Path) -> Path:
+def outside(tmp_path: Path) -> Path:
+    return tmp_path / "outside"
+
+
+@pytest.fixture
+def robot(tmp_path: Path, outside: Path) -> Path:
     """A robot's folder, beside one that it may not read; links lead there."""
-    outside, own = tmp_path / "outside", tmp_path / "robots" / "arm"
+    own = tmp_path / "robots" / "arm"
     (outside / "meshes").mkdir(parents=True)
     own.mkdir(parents=True)
     (outside / "package.xml").write_text("<package><name>other</name></package>")
@@ -70,10 +75,9 @@ OF_XACRO = {
 
 
 @pytest.mark.parametrize("text", OF_XACRO.values(), ids=OF_XACRO)
-def test_a_xacro_reads_its_own_folder_only(text: str, robot: Path) -> None:
+def test_a_xacro_reads_its_own_folder_only(text: str, robot: Path, outside: Path) -> None:
     path = robot / "arm.xacro"
-    outside = robot.parents[1] / "outside"
-    path.write_text(XACRO.format(text.format(outside=outside)))
+    path.write_text(xacro(text.format(outside=outside)))
     with pytest.raises(RobotError) as caught:
         load_description(str(path))
     words = str(caught.value)
@@ -86,7 +90,7 @@ def test_a_variable_that_is_not_read_has_its_default(
 ) -> None:
     monkeypatch.setenv("SECRET", "sesame")
     path = robot / "arm.xacro"
-    path.write_text(XACRO.format('<a b="$(optenv SECRET none)" c="$(optenv ROS_DISTRO none)"/>'))
+    path.write_text(xacro('<a b="$(optenv SECRET none)" c="$(optenv ROS_DISTRO none)"/>'))
     monkeypatch.setenv("ROS_DISTRO", "jazzy")
     assert '<a b="none" c="jazzy"' in load_description(str(path)).urdf
 
@@ -117,14 +121,10 @@ OF_MJCF = {
 
 
 @pytest.mark.parametrize("text", OF_MJCF.values(), ids=OF_MJCF)
-def test_an_mjcf_reads_its_own_folder_only(text: str, robot: Path) -> None:
-    outside = robot.parents[1] / "outside"
-    (robot / "own.xml").write_text(
-        f'<mujocoinclude><include file="{outside}/s.xml"/></mujocoinclude>'
-    )
-    (robot / "folder.xml").write_text(
-        f'<mujocoinclude><compiler meshdir="{outside}"/></mujocoinclude>'
-    )
+def test_an_mjcf_reads_its_own_folder_only(text: str, robot: Path, outside: Path) -> None:
+    included = "<mujocoinclude>{}</mujocoinclude>"
+    (robot / "own.xml").write_text(included.format(f'<include file="{outside}/s.xml"/>'))
+    (robot / "folder.xml").write_text(included.format(f'<compiler meshdir="{outside}"/>'))
     path = robot / "arm.xml"
     body = '<worldbody><body><joint/><geom size="0.1" mass="1"/></body></worldbody>'
     path.write_text(f"<mujoco>{text.format(outside=outside)}{body}</mujoco>")
@@ -149,17 +149,13 @@ OF_MESHES = {
     "a model": "model://other/s.stl",
     "its own folder and out": "../arm/../../outside/s.stl",
 }
-LINK = """<link name="l"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0"
- iyz="0"/></inertial>{0}</link>"""
-SHAPE = '<{kind}><geometry><mesh filename="{name}"/></geometry></{kind}>'
-JOINT = """<joint name="j" type="revolute"><parent link="base"/><child link="l"/><axis xyz="0 1 0"/>
-<limit lower="-1" upper="1" velocity="1" effort="9"/></joint>"""
 
 
 def urdf(robot: Path, kind: Kind, name: str) -> Path:
     path = robot / "arm.urdf"
-    shape = SHAPE.format(kind=kind, name=name)
-    path.write_text(f'<robot name="a"><link name="base"/>{LINK.format(shape)}{JOINT}</robot>')
+    shape = f'<{kind}><geometry><mesh filename="{name}"/></geometry></{kind}></link>'
+    plain = xacro("").replace(' xmlns:xacro="http://www.ros.org/wiki/xacro"', "")
+    path.write_text(plain.replace("</link>", shape, 1))
     return path
 
 
@@ -180,17 +176,16 @@ def sdf(robot: Path, kind: Kind, name: str) -> Path:
 @pytest.mark.parametrize("kind", ["collision", "visual"])
 @pytest.mark.parametrize("name", OF_MESHES.values(), ids=OF_MESHES)
 def test_a_mesh_outside_is_neither_read_nor_allowed_by_init(
-    name: str, kind: Kind, write: Callable[[Path, Kind, str], Path], robot: Path
+    name: str, kind: Kind, write: Callable[[Path, Kind, str], Path], robot: Path, outside: Path
 ) -> None:
-    path = write(robot, kind, name.format(outside=robot.parents[1] / "outside"))
+    path = write(robot, kind, name.format(outside=outside))
     with pytest.raises(RobotError, match=r"leaves the robot's own folders|was not found"):
         check_mesh_paths(load_description(str(path)), kind)
     with pytest.raises(OutsideError, match="which is outside its own folder"):
         load_with_folders(path.name, (), robot)
 
 
-def test_what_a_mesh_names_is_not_read_outside(robot: Path) -> None:
-    outside = robot.parents[1] / "outside"
+def test_what_a_mesh_names_is_not_read_outside(robot: Path, outside: Path) -> None:
     (outside / "m.mtl").write_text("newmtl a\n")
     (outside / "b.bin").write_bytes(bytes(100))
     (robot / "m.obj").write_bytes(b"mtllib ../../outside/m.mtl\n" + VALID["obj"])
@@ -213,9 +208,7 @@ def test_no_odd_name_of_a_package_is_allowed_with_all_that_was_found(
     for parent in robot.parents[:2]:
         (parent / ".hidden").mkdir(exist_ok=True)
     path = robot / "arm.xacro"
-    path.write_text(
-        XACRO.format(f'<xacro:include filename="$(find {name.replace(chr(27), "")})/x"/>')
-    )
+    path.write_text(xacro(f'<xacro:include filename="$(find {name.replace(chr(27), "")})/x"/>'))
     with pytest.raises(RobotError) as caught:
         load_description(str(path))
     assert not isinstance(caught.value, OutsideError) or not caught.value.needed.near
@@ -256,8 +249,8 @@ def test_mjcf_files_above_each_other_in_one_package_are_read(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("line", ["mtllib s.mtl", "mtllib \\\ns.mtl", "\x0cmtllib s.mtl"])
-def test_this_process_reads_copies_of_meshes_only(line: str, robot: Path) -> None:
-    (robot / "s.mtl").symlink_to(robot.parents[1] / "outside" / "s.yaml")
+def test_this_process_reads_copies_of_meshes_only(line: str, robot: Path, outside: Path) -> None:
+    (robot / "s.mtl").symlink_to(outside / "s.yaml")
     (robot / "s.obj").write_bytes(line.encode() + b"\n" + VALID["obj"])
     description = load_description(str(urdf(robot, "collision", "s.obj")))
     try:
@@ -279,8 +272,9 @@ def test_nothing_waits_for_a_pipe(robot: Path) -> None:
         check_mesh_paths(load_description(str(urdf(robot, "collision", "m.obj"))))
 
 
-def test_init_says_what_it_would_allow_and_writes_what_was_allowed(robot: Path) -> None:
-    outside = robot.parents[1] / "outside"
+def test_init_says_what_it_would_allow_and_writes_what_was_allowed(
+    robot: Path, outside: Path
+) -> None:
     (robot / "linked").unlink()
     path = urdf(robot, "collision", "package://other/s.stl")
     asked: list[str] = []
@@ -291,14 +285,14 @@ def test_init_says_what_it_would_allow_and_writes_what_was_allowed(robot: Path) 
 
 
 def test_a_path_that_may_lead_anywhere_is_not_allowed_with_all_that_was_found(
-    robot: Path,
+    robot: Path, outside: Path
 ) -> None:
-    path = urdf(robot, "collision", str(robot.parents[1] / "outside" / "s.stl"))
+    path = urdf(robot, "collision", str(outside / "s.stl"))
     with pytest.raises(OutsideError) as caught:
         propose(Request(path.name, robot))
     assert caught.value.needed.near
     path.write_text(path.read_text().replace("s.stl", "none.stl"))
-    (robot / "arm.xacro").write_text(XACRO.format(OF_XACRO["table of the system"].format()))
+    (robot / "arm.xacro").write_text(xacro(OF_XACRO["table of the system"].format()))
     with pytest.raises(OutsideError) as caught:
         load_description(str(robot / "arm.xacro"))
     assert not caught.value.needed.near

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from benchmarks.trust.fuzz_catalogue import FUZZERS, fuzzer_named
-from benchmarks.trust.fuzz_trial import Fuzzer, attempt, generator
+from benchmarks.trust.fuzz_trial import attempt, generator
 from excite_cli.errors import ConfigError, ExciteError
+from tests.trust.refusals import Entry
 
 # How many inputs; those of results need a plan and a diagnosis first.
 SHARES = {"config": 60, "csv": 100, "hdf5": 60, "bags": 40, "motions": 40, "urdf": 50}
@@ -35,19 +36,6 @@ def test_every_parser_has_a_share() -> None:
     assert {fuzzer.name for fuzzer in FUZZERS} - set(SHARES) == {"results"}
 
 
-class _Faulty(Fuzzer):
-    name = "faulty"
-
-    def __init__(self, raised: BaseException) -> None:
-        self.raised = raised
-
-    def make(self, rng: object, folder: Path) -> tuple[Path, str]:
-        raise AssertionError("this one is only entered: nothing is made for it")
-
-    def enter(self, path: Path) -> None:
-        raise self.raised
-
-
 @pytest.mark.parametrize(
     ("raised", "end"),
     [
@@ -61,4 +49,7 @@ class _Faulty(Fuzzer):
     ],
 )
 def test_the_judge_tells_faults_from_refusals(raised: BaseException, end: str) -> None:
-    assert attempt(_Faulty(raised), Path("log.csv"), 0, "").end == end
+    def enter(path: Path) -> None:
+        raise raised
+
+    assert attempt(Entry(enter), Path("log.csv"), 0, "").end == end

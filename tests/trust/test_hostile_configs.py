@@ -18,43 +18,27 @@ BOMB = "a0: &a0 [x]\n" + "".join(
 )
 
 
-@pytest.mark.parametrize(
-    ("text", "word"),
-    [
-        (BOMB, "aliases"),
-        ("robot: &a {urdf: *a}", "aliases"),
-        ("[" * 100_000, "nested deeper"),
-        ("{a: " * 100_000, "nested deeper"),
-        ("- " * 100_000, "nested deeper"),
-        ("".join(f"k{k}: 1\n" for k in range(80_000)), f"more than {MAX_VALUES:,}"),
-        (f"{ROBOT}seed: " + "9" * 300_000, "a number of 300000 characters"),
-        # To the base of 60, as YAML 1.1 has it: quadratic in time.
-        (f"{ROBOT}seed: 1" + ":59" * 200_000, "a number of 600001 characters"),
-        # More digits than Python prints.
-        (f"{ROBOT}seed: 0x" + "f" * (LONGEST_NUMBER - 2), "allowed"),
-        ("robot: {<<: {urdf: a, mass: 1}, urdf: b}", "merge keys (<<)"),
-        ("robot: !!python/object/apply:os.system [id]", "not valid YAML"),
-        (ROBOT + "x: " + "y" * 900_000, "unknown key"),
-        (ROBOT + "x" * 900_000 + ": 1", "not valid YAML"),
-        ("robot: {urdf: a, joints: [" + "x, " * 40_000 + "]}", "named twice: x"),
-    ],
-    ids=[
-        "bomb",
-        "recursion",
-        "brackets",
-        "braces",
-        "dashes",
-        "many keys",
-        "digits",
-        "sixty",
-        "hexadecimal",
-        "merge",
-        "code",
-        "long value",
-        "long key",
-        "doubled joints",
-    ],
-)
+HOSTILE = {
+    "bomb": (BOMB, "aliases"),
+    "recursion": ("robot: &a {urdf: *a}", "aliases"),
+    "brackets": ("[" * 100_000, "nested deeper"),
+    "braces": ("{a: " * 100_000, "nested deeper"),
+    "dashes": ("- " * 100_000, "nested deeper"),
+    "many keys": ("".join(f"k{k}: 1\n" for k in range(80_000)), f"more than {MAX_VALUES:,}"),
+    "digits": (f"{ROBOT}seed: " + "9" * 300_000, "a number of 300000 characters"),
+    # To the base of 60, as YAML 1.1 has it: quadratic in time.
+    "sixty": (f"{ROBOT}seed: 1" + ":59" * 200_000, "a number of 600001 characters"),
+    # More digits than Python prints.
+    "hexadecimal": (f"{ROBOT}seed: 0x" + "f" * (LONGEST_NUMBER - 2), "allowed"),
+    "merge": ("robot: {<<: {urdf: a, mass: 1}, urdf: b}", "merge keys (<<)"),
+    "code": ("robot: !!python/object/apply:os.system [id]", "not valid YAML"),
+    "long value": (ROBOT + "x: " + "y" * 900_000, "unknown key"),
+    "long key": (ROBOT + "x" * 900_000 + ": 1", "not valid YAML"),
+    "doubled joints": ("robot: {urdf: a, joints: [" + "x, " * 40_000 + "]}", "named twice: x"),
+}
+
+
+@pytest.mark.parametrize(("text", "word"), HOSTILE.values(), ids=HOSTILE)
 def test_refused_with_a_message(text: str, word: str, tmp_path: Path) -> None:
     path = tmp_path / "hostile.yaml"
     path.write_text(text, encoding="utf-8")

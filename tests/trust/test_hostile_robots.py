@@ -38,74 +38,65 @@ def hostile(folder: Path, text: str) -> Path:
     return path
 
 
+def stl(path: Path, mark: bytes) -> Path:
+    """A good mesh that no other test has."""
+    path.write_bytes(mark + binary_stl()[4:])
+    return path
+
+
 def chain(links: int, kind: str) -> str:
     parts = "".join(link(f"l{k}") for k in range(links))
     joints = "".join(joint(f"j{k}", f"l{k}", f"l{k + 1}", kind) for k in range(links - 1))
     return f'<robot name="c">{parts}{joints}</robot>'
 
 
-@pytest.mark.parametrize(
-    ("text", "word"),
-    [
-        (f"<!DOCTYPE robot [{BOMB}]><robot>&j;</robot>", "entities"),
-        ('<!DOCTYPE r [<!ENTITY e SYSTEM "file:///etc/passwd">]><robot>&e;</robot>', "entities"),
-        ("<robot>" + "<link name='a'>" * 5000 + "</link>" * 5000 + "</robot>", f"{MAX_DEPTH} lev"),
-        ("<robot>" + "<link/>" * 250_000 + "</robot>", "too large"),
-        (chain(MAX_LINKS + 1, "fixed"), f"up to {MAX_LINKS:,} links"),
-        (chain(MAX_MOVABLE + 2, "revolute"), f"{MAX_MOVABLE} movable joints"),
-        (urdf().replace("</robot>", joint("back", "hand", "base") + "</robot>"), "no first link"),
-        (urdf().replace("</robot>", joint("twin", "base", "hand") + "</robot>"), "two joints lead"),
-        (urdf().replace('name="wrist"', 'name="elbow"'), "two joints are called 'elbow'"),
-        (urdf().replace('xyz="0 0 0.5"', 'xyz="0 0 1e300"', 1), "not three numbers"),
-        (urdf().replace('xyz="0 0 0.5"', 'xyz="0 nan 0"', 1), "not three numbers"),
-        (urdf().replace('xyz="0 1 0"', 'xyz="1e308 1e308 0"', 1), "has the axis"),
-        (urdf().replace("<origin ", '<origin rpy="inf 0 0" ', 1), "<origin rpy"),
-        (urdf().replace('mass value="1"', 'mass value="-1"', 1), "a mass not negative"),
-        (urdf().replace('ixx="0.1"', 'ixx="nan"', 1), "finite numbers"),
-        (urdf().replace('radius="0.05"', 'radius="-1"', 1), "not a number"),
-    ],
-    ids=[
-        "billion laughs",
-        "external entity",
-        "depth",
-        "elements",
-        "links",
-        "joints",
-        "cycle",
-        "loop",
-        "twin joints",
-        "far",
-        "nan",
-        "axis",
-        "turn",
-        "mass",
-        "inertia",
-        "radius",
-    ],
-)
+ISLAND = link("x") + link("y") + joint("a", "x", "y") + joint("b", "y", "x")
+
+
+def beside(more: str) -> str:
+    """The arm, with more in it."""
+    return urdf().replace("</robot>", f"{more}</robot>")
+
+
+HOSTILE = {
+    "billion laughs": (f"<!DOCTYPE robot [{BOMB}]><robot>&j;</robot>", "entities"),
+    "external entity": (
+        '<!DOCTYPE r [<!ENTITY e SYSTEM "file:///etc/passwd">]><robot>&e;</robot>',
+        "entities",
+    ),
+    "depth": (
+        "<robot>" + "<link name='a'>" * 5000 + "</link>" * 5000 + "</robot>",
+        f"{MAX_DEPTH} lev",
+    ),
+    "elements": ("<robot>" + "<link/>" * 250_000 + "</robot>", "too large"),
+    "links": (chain(MAX_LINKS + 1, "fixed"), f"up to {MAX_LINKS:,} links"),
+    "joints": (chain(MAX_MOVABLE + 2, "revolute"), f"{MAX_MOVABLE} movable joints"),
+    "cycle": (beside(joint("back", "hand", "base")), "no first link"),
+    "loop": (beside(joint("twin", "base", "hand")), "two joints lead"),
+    "twin joints": (
+        urdf().replace('name="wrist"', 'name="elbow"'),
+        "two joints are called 'elbow'",
+    ),
+    "far": (urdf().replace('xyz="0 0 0.5"', 'xyz="0 0 1e300"', 1), "not three numbers"),
+    "nan": (urdf().replace('xyz="0 0 0.5"', 'xyz="0 nan 0"', 1), "not three numbers"),
+    "axis": (urdf().replace('xyz="0 1 0"', 'xyz="1e308 1e308 0"', 1), "has the axis"),
+    "turn": (urdf().replace("<origin ", '<origin rpy="inf 0 0" ', 1), "<origin rpy"),
+    **{
+        f"mass {each}": (
+            urdf().replace('mass value="1"', f'mass value="{each}"', 1),
+            "a mass not negative",
+        )
+        for each in ("-1", "nan", "1e300", "heavy")
+    },
+    "inertia": (urdf().replace('ixx="0.1"', 'ixx="nan"', 1), "finite numbers"),
+    "radius": (urdf().replace('radius="0.05"', 'radius="-1"', 1), "not a number"),
+    "island": (beside(ISLAND), "go round in a circle"),
+}
+
+
+@pytest.mark.parametrize(("text", "word"), HOSTILE.values(), ids=HOSTILE)
 def test_urdf(text: str, word: str, tmp_path: Path) -> None:
     assert word in refused(built, hostile(tmp_path, text))
-
-
-def test_islands_that_go_round_in_a_circle(tmp_path: Path) -> None:
-    island = link("x") + link("y") + joint("a", "x", "y") + joint("b", "y", "x")
-    text = urdf().replace("</robot>", island + "</robot>")
-    assert "go round in a circle" in refused(built, hostile(tmp_path, text))
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        "../../../../../../etc/passwd",
-        "/etc/passwd",
-        "file:///etc/passwd",
-        "package://../../../../../../../etc/passwd",
-    ],
-)
-def test_paths_that_leave_the_folder(name: str, tmp_path: Path) -> None:
-    text = urdf(collision=mesh(name))
-    message = refused(built, hostile(tmp_path, text))
-    assert "leaves the robot's own folders" in message or "was not found" in message
 
 
 @pytest.mark.parametrize("target", ["/etc/passwd", "/dev/zero", "hand.stl", "none"])
@@ -122,23 +113,19 @@ def test_names_that_no_file_has(name: str, tmp_path: Path) -> None:
     assert len(message) < 1000
 
 
-@pytest.mark.parametrize(
-    ("suffix", "data", "word"),
-    [
-        ("stl", binary_stl(2**32 - 1), "cannot be loaded"),
-        ("stl", binary_stl()[:100], "cannot be loaded"),
-        ("stl", b"", "cannot be loaded"),
-        ("ply", CRASHING, "reading it fails"),
-        ("dae", VALID["dae"].replace(b'count="4"', b'count="99999999999"'), "cannot be loaded"),
-        ("blend", VALID["stl"], "of no known format"),
-        (
-            "stl",
-            binary_stl()[:84] + struct.pack("<12fH", *[float("nan")] * 12, 0) * 4,
-            "not finite",
-        ),
-    ],
-    ids=["4e9 triangles", "cut", "empty", "crash", "claims", "format", "nan"],
-)
+NOT_FINITE = struct.pack("<12fH", *[float("nan")] * 12, 0)
+MESHES = {
+    "4e9 triangles": ("stl", binary_stl(2**32 - 1), "cannot be loaded"),
+    "cut": ("stl", binary_stl()[:100], "cannot be loaded"),
+    "empty": ("stl", b"", "cannot be loaded"),
+    "crash": ("ply", CRASHING, "reading it fails"),
+    "claims": ("dae", VALID["dae"].replace(b'count="4"', b'count="99999999999"'), "cannot be load"),
+    "format": ("blend", VALID["stl"], "of no known format"),
+    "nan": ("stl", binary_stl()[:84] + NOT_FINITE * 4, "not finite"),
+}
+
+
+@pytest.mark.parametrize(("suffix", "data", "word"), MESHES.values(), ids=MESHES)
 def test_meshes(suffix: str, data: bytes, word: str, tmp_path: Path) -> None:
     (tmp_path / f"hand.{suffix}").write_bytes(data)
     path = hostile(tmp_path, urdf(collision=mesh(f"hand.{suffix}")))
@@ -163,8 +150,7 @@ def test_good_meshes_are_read(tmp_path: Path) -> None:
 
 def test_a_slow_mesh_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With no time at all, the process is ended, and says so."""
-    path = tmp_path / "hand.stl"
-    path.write_bytes(binary_stl() + b" slow")
+    path = stl(tmp_path / "hand.stl", b"slow")
     mesh_trial._trial.close()
     monkeypatch.setattr(mesh_trial, "_SLOWEST", 1e-6)
     assert "takes too long" in faults([path], [tmp_path])[path]
@@ -174,18 +160,16 @@ def test_what_lies_in_the_current_folder_is_not_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "json.py").write_text("open('ran', 'w')\nraise SystemExit(3)\n", encoding="utf-8")
-    (tmp_path / "hand.stl").write_bytes(b"here" + binary_stl()[4:])
     mesh_trial._trial.close()
     monkeypatch.chdir(tmp_path)
-    assert not faults([tmp_path / "hand.stl"], [tmp_path])
+    assert not faults([stl(tmp_path / "hand.stl", b"here")], [tmp_path])
     assert not (tmp_path / "ran").exists()
 
 
 def test_after_an_interruption_the_next_answer_is_its_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    good, bad = tmp_path / "good.stl", tmp_path / "bad.stl"
-    good.write_bytes(b"good" + binary_stl()[4:])
+    good, bad = stl(tmp_path / "good.stl", b"good"), tmp_path / "bad.stl"
     bad.write_bytes(binary_stl()[:100] + b"bad")
     assert not faults([good], [tmp_path])
     process = mesh_trial._trial._process
@@ -206,8 +190,7 @@ def test_after_an_interruption_the_next_answer_is_its_own(
 @pytest.mark.skipif(not Path("/proc/self/limits").exists(), reason="Linux tells the limits so")
 def test_what_is_loaded_already_does_not_count_to_the_memory_of_meshes(tmp_path: Path) -> None:
     """Threads of linear algebra reserve tens of MiB each: as many as there are cores."""
-    (tmp_path / "hand.stl").write_bytes(b"room" + binary_stl()[4:])
-    assert not faults([tmp_path / "hand.stl"], [tmp_path])
+    assert not faults([stl(tmp_path / "hand.stl", b"room")], [tmp_path])
     process = mesh_trial._trial._process
     assert process is not None
     limits = Path(f"/proc/{process.pid}/limits").read_text(encoding="ascii")
@@ -219,7 +202,7 @@ def test_what_is_loaded_already_does_not_count_to_the_memory_of_meshes(tmp_path:
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="Linux tells the peak so")
 def test_a_script_with_a_large_array_can_read_meshes(tmp_path: Path) -> None:
     """A process begins with the peak memory of the one that started it, by one of two counts."""
-    (tmp_path / "palm.stl").write_bytes(b"room" + binary_stl()[4:])
+    stl(tmp_path / "palm.stl", b"room")
     script = (
         "import sys\n"
         "from pathlib import Path\n"

@@ -3,7 +3,6 @@
 import os
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -15,125 +14,90 @@ from tests.trust.conftest import SMOKE, Loop
 from tests.trust.in_process import refused
 
 
-@dataclass(frozen=True)
-class Files:
-    """Copies that a bad command could spoil: all in one folder, the URDF too."""
-
-    folder: Path
-    config: Path
-    urdf: Path
-    result: Path
-    data: Path
-    fit: Path
-    diagnosis: Path
-
-    def contents(self) -> dict[str, bytes]:
-        return {p.name: p.read_bytes() for p in sorted(self.folder.iterdir()) if p.is_file()}
-
-
 @pytest.fixture
-def files(loop: Loop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Files:
+def folder(loop: Loop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current one, with copies that a bad command could spoil: the URDF too."""
     for path in (loop.result, loop.data, loop.fit, loop.diagnosis):
         shutil.copy(path, tmp_path / path.name)
     shutil.copy(SMOKE.parent.parent / "data" / "smoke_arm.urdf", tmp_path / "arm.urdf")
-    config = tmp_path / "arm.yaml"
-    config.write_text(SMOKE.read_text().replace("../data/smoke_arm.urdf", "arm.urdf"))
+    text = SMOKE.read_text().replace("../data/smoke_arm.urdf", "arm.urdf")
+    (tmp_path / "arm.yaml").write_text(text)
     monkeypatch.chdir(tmp_path)
-    names = ("result", "data", "fit", "diagnosis")
-    return Files(tmp_path, config, tmp_path / "arm.urdf", *(tmp_path / f"{n}.h5" for n in names))
+    return tmp_path
 
 
-Command = Callable[[Files], list[str | Path]]
+def contents(folder: Path) -> dict[str, bytes]:
+    return {p.name: p.read_bytes() for p in sorted(folder.iterdir()) if p.is_file()}
+
+
 FIT = "uncertainty.fit=fit.h5"
-COMMANDS: dict[str, Command] = {
-    "optimize on its config": lambda f: ["optimize", f.config, "-o", f.config],
-    "optimize on its URDF": lambda f: ["optimize", f.config, "-o", f.urdf],
-    "optimize on its fit": lambda f: ["optimize", f.config, "-o", f.fit, "--set", FIT],
-    "optimize on --prior": lambda f: ["optimize", f.config, "--prior", f.data, "-o", f.data],
-    "optimize on --start": lambda f: ["optimize", f.config, "--start", f.result, "-o", f.result],
-    "optimize on --after": lambda f: [
-        "optimize", f.config, "--after", f.diagnosis, "-o", f.diagnosis
-    ],
-    "compare-random on its config": lambda f: ["compare-random", f.config, "-o", f.config],
-    "compare-random on its URDF": lambda f: ["compare-random", f.config, "-o", f.urdf],
-    "compare-random on --optimized": lambda f: [
-        "compare-random", f.config, "--optimized", f.result, "-o", f.result
-    ],
-    "simulate on its motions": lambda f: ["simulate", f.config, f.result, "-o", f.result],
-    "simulate on its URDF": lambda f: ["simulate", f.config, f.result, "-o", f.urdf],
-    "identify on its data": lambda f: ["identify", f.config, f.data, "-o", f.data],
-    "identify --urdf on the URDF": lambda f: ["identify", f.config, f.data, "--urdf", f.urdf],
-    "identify --mjcf on its data": lambda f: ["identify", f.config, f.data, "--mjcf", f.data],
-    "identify --parameters on its config": lambda f: [
-        "identify", f.config, f.data, "--parameters", f.config
-    ],
-    "diagnose on its data": lambda f: ["diagnose", f.config, f.data, "-o", f.data],
-    "diagnose --apply on its config": lambda f: [
-        "diagnose", f.config, f.data, "--apply", f.config
-    ],
-    "diagnose --apply on its URDF": lambda f: ["diagnose", f.config, f.data, "--apply", f.urdf],
-    "export of motions": lambda f: [
-        "export", f.result, "-f", "csv", "--motion", "1", "-o", f.result
-    ],
-    "export of a fit": lambda f: ["export", f.fit, "-f", "urdf", "-o", f.fit],
-    "init on its URDF": lambda f: ["init", "--urdf", f.urdf, "-o", f.urdf],
-}  # fmt: skip
+COMMANDS = [
+    "optimize arm.yaml -o arm.yaml",
+    "optimize arm.yaml -o arm.urdf",
+    f"optimize arm.yaml -o fit.h5 --set {FIT}",
+    "optimize arm.yaml --prior data.h5 -o data.h5",
+    "optimize arm.yaml --start result.h5 -o result.h5",
+    "optimize arm.yaml --after diagnosis.h5 -o diagnosis.h5",
+    "compare-random arm.yaml -o arm.yaml",
+    "compare-random arm.yaml -o arm.urdf",
+    "compare-random arm.yaml --optimized result.h5 -o result.h5",
+    "simulate arm.yaml result.h5 -o result.h5",
+    "simulate arm.yaml result.h5 -o arm.urdf",
+    "identify arm.yaml data.h5 -o data.h5",
+    "identify arm.yaml data.h5 --urdf arm.urdf",
+    "identify arm.yaml data.h5 --mjcf data.h5",
+    "identify arm.yaml data.h5 --parameters arm.yaml",
+    "diagnose arm.yaml data.h5 -o data.h5",
+    "diagnose arm.yaml data.h5 --apply arm.yaml",
+    "diagnose arm.yaml data.h5 --apply arm.urdf",
+    "export result.h5 -f csv --motion 1 -o result.h5",
+    "export fit.h5 -f urdf -o fit.h5",
+    "init --urdf arm.urdf -o arm.urdf",
+    # These ask for a suffix: a result of that name is still an input.
+    "report page.html -o ./page.html",
+    "view picture.png --png ./picture.png",
+    # A study whose case is its log.
+    "study arm.yaml data.h5 data_seed=1.fit.h5 --vary seed=1 -o .",
+]
 
 
-@pytest.mark.parametrize("name", COMMANDS)
-def test_no_command_replaces_its_inputs(files: Files, name: str) -> None:
-    before = files.contents()
-    told = refused(*COMMANDS[name](files), "--overwrite")
-    assert "Results never replace what they are made from: give another name." in told
-    assert files.contents() == before
-
-
-@pytest.mark.parametrize("command", ["report", "view"])
-def test_pages_and_pictures_that_are_inputs(files: Files, command: str) -> None:
-    """They ask for a suffix: a result of that name is still an input."""
-    name, option = {"report": ("page.html", "-o"), "view": ("picture.png", "--png")}[command]
-    shutil.copy(files.result, name)
-    before = files.contents()
-    assert "would replace" in refused(command, name, option, f"./{name}", "--overwrite")
-    assert files.contents() == before
-
-
-def test_a_study_whose_case_is_its_log(files: Files) -> None:
-    log = Path("data_seed=1.fit.h5")
-    shutil.copy(files.data, log)
-    before = files.contents()
-    told = refused(
-        "study", files.config, files.data, log, "--vary", "seed=1", "-o", ".", "--overwrite"
-    )
+@pytest.mark.parametrize("command", COMMANDS)
+def test_no_command_replaces_its_inputs(folder: Path, command: str) -> None:
+    for name in ("page.html", "picture.png"):
+        shutil.copy("result.h5", name)
+    shutil.copy("data.h5", "data_seed=1.fit.h5")
+    before = contents(folder)
+    told = refused(*command.split(), "--overwrite")
     assert "would replace" in told
-    assert files.contents() == before
+    assert "Results never replace what they are made from: give another name." in told
+    assert contents(folder) == before
 
 
-def _linked(files: Files) -> Path:
-    link = files.folder / "other.h5"
-    link.symlink_to(files.data)
+def _linked(path: Path) -> Path:
+    link = path.with_name("other.h5")
+    link.symlink_to(path)
     return link
 
 
-def _hard_linked(files: Files) -> Path:
-    link = files.folder / "other.h5"
-    os.link(files.data, link)
+def _hard_linked(path: Path) -> Path:
+    link = path.with_name("other.h5")
+    os.link(path, link)
     return link
 
 
-def _roundabout(files: Files) -> Path:
-    return Path("..") / files.folder.name / "." / "data.h5"
+def _roundabout(path: Path) -> Path:
+    return Path("..") / path.parent.name / "." / path.name
 
 
 @pytest.mark.parametrize("spelt", [_linked, _hard_linked, _roundabout])
 @pytest.mark.parametrize("turned", [False, True])
 def test_other_spellings_are_the_same_file(
-    files: Files, spelt: Callable[[Files], Path], turned: bool
+    folder: Path, spelt: Callable[[Path], Path], turned: bool
 ) -> None:
-    output, given = spelt(files), files.data
+    output, given = spelt(folder / "data.h5"), folder / "data.h5"
     if turned:
         output, given = given, output
-    told = refused("identify", files.config, given, "-o", output, "--overwrite")
+    told = refused("identify", "arm.yaml", given, "-o", output, "--overwrite")
     assert f"--output {output} would replace {given}" in told
 
 
@@ -147,25 +111,21 @@ def test_folders_that_hold_inputs(tmp_path: Path) -> None:
     refuse_inputs_as_outputs({"output": bag / "new.h5", "none": None}, (log, bag))
 
 
-def test_the_library_refuses_too(files: Files) -> None:
-    problem = api.load_problem(files.config, ["optimizer.max_iterations=1", FIT])
-    data, case = api.load_data(problem, files.data), api.load_case(files.config)
-    following = api.plan_after(case, files.diagnosis)
-    found, fit = api.read_diagnosis(files.diagnosis), api.identify(case, data)
+def test_functions_that_no_command_calls_so_refuse_too(folder: Path) -> None:
+    case = api.load_case(folder / "arm.yaml")
+    data = api.load_data(case, folder / "data.h5")
+    found, fitted = api.read_diagnosis(folder / "diagnosis.h5"), api.identify(case, data)
+    urdf = folder / "arm.urdf"
     calls: list[Callable[[], object]] = [
-        lambda: api.plan(problem, output=files.urdf, overwrite=True),
-        lambda: api.plan(problem, output=files.config, overwrite=True),
-        lambda: api.plan(following, output=files.config, overwrite=True),
-        lambda: api.diagnose(case, data, apply=files.config, overwrite=True),
-        lambda: api.simulate(case, files.result, output=files.config, overwrite=True),
-        lambda: api.plan(problem, output=str(files.fit), overwrite=True),
-        lambda: api.plan(problem, priors=[files.result], output=files.result, overwrite=True),
-        lambda: api.diagnose(problem, data, output=files.data),
-        lambda: api.save_config(files.urdf, problem, found),
-        lambda: api.save_fit(files.urdf, problem, fit),
+        lambda: api.simulate(
+            case, folder / "result.h5", output=folder / "arm.yaml", overwrite=True
+        ),
+        lambda: api.write_dataset(folder / "data.h5", data, {}),
+        lambda: api.save_config(urdf, case, found),
+        lambda: api.save_fit(urdf, case, fitted),
     ]
-    before = files.contents()
+    before = contents(folder)
     for call in calls:
         with pytest.raises(FileError, match="would replace"):
             call()
-    assert files.contents() == before
+    assert contents(folder) == before

@@ -9,6 +9,8 @@ import pytest
 from excite_cli.errors import RobotError
 from excite_cli.robot.description import load_description
 from excite_cli.robot.formats.xacro_expression import evaluate, symbols
+from tests.cli.program import EXCITE
+from tests.trust.conftest import XACRO
 
 U = "'_'*2"  # two underscores, which a search for them does not see
 # The attribute `name` of a value, without a dot: by the descriptors of its type.
@@ -20,6 +22,8 @@ GLOBALS = f"{OF}(xacro.load_yaml, {U}+'globals'+{U})"
 RUN = "system('touch written')"
 BASE = f"python.vars(python.type)[{U}+'getattribute'+{U}](python.str, {U}+'base'+{U})"
 SUBCLASSES = f"python.vars(python.type)[{U}+'subclasses'+{U}]({BASE})"
+
+TABLE = symbols({"load_yaml": dict, "abs_filename": str, "dotify": dict})
 
 PROGRAMS = {
     "globals of a function": f"{GLOBALS}['os'].{RUN}",
@@ -61,22 +65,22 @@ PROGRAMS = {
     "time by range": "[1 for a in range(100000) for b in range(100000)]",
 }
 
-ARM = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="arm">{more}<link name="base"/>
-<link name="l"><inertial><mass value="{mass}"/>
-<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="j" type="revolute"><parent link="base"/><child link="l"/>
-<limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
-
 
 def escaped(text: str) -> str:
     return text.replace("&", "&amp;").replace('"', "&quot;").replace("<", "&lt;")
 
 
-def refused(path: Path) -> str:
-    """What is said of a file that is refused."""
-    with pytest.raises(RobotError) as caught:
+def refused(path: Path, text: str) -> None:
+    """Such a file is not read, and wrote nothing beside itself."""
+    path.write_text(text)
+    with pytest.raises(RobotError, match="nothing in a robot's file is run"):
         load_description(str(path))
-    return str(caught.value)
+    assert not (path.parent / "written").exists()
+
+
+def of(folder: Path) -> str:
+    """A program that would write in the folder."""
+    return f"(lambda: {GLOBALS}['os'].system('touch {folder}/written'))()"
 
 
 @pytest.mark.parametrize("program", PROGRAMS.values(), ids=PROGRAMS)
@@ -84,19 +88,17 @@ def test_an_expression_runs_nothing(
     program: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    table = symbols({"load_yaml": lambda name: {}, "abs_filename": str, "dotify": dict})
     with pytest.raises(ValueError, match="nothing in a robot's file is run"):
-        evaluate(program, table, table)
+        evaluate(program, TABLE, TABLE)
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("text", ["b'a'", "1j", "...", "module", "[module][0]", "stranger('x')"])
 def test_no_value_of_another_kind_comes_in(text: str) -> None:
     """Whatever the library may put among its symbols, only plain data and listed functions pass."""
-    table = symbols({"load_yaml": dict, "abs_filename": str, "dotify": dict})
-    names = {**table, "module": sys, "stranger": print}
+    names = {**TABLE, "module": sys, "stranger": print}
     with pytest.raises(ValueError, match="a value of type"):
-        evaluate(text, names, table)
+        evaluate(text, names, TABLE)
 
 
 # Ways to an expression: attributes, text, arguments of macros, `eval`, included files, tables.
@@ -113,45 +115,24 @@ WAYS = {
 
 
 @pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
-def test_no_way_to_an_expression_runs_it(
-    way: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    path = tmp_path / "arm.xacro"
-    program = f"(lambda: {GLOBALS}['os'].{RUN.replace('written', str(tmp_path / 'written'))})()"
-    path.write_text(ARM.format(mass=1, more=way.format(escaped(program))))
-    words = refused(path)
-    assert "nothing in a robot's file is run" in words, words
-    assert not (tmp_path / "written").exists()
+def test_no_way_to_an_expression_runs_it(way: str, tmp_path: Path) -> None:
+    more = way.format(escaped(of(tmp_path)))
+    refused(tmp_path / "arm.xacro", XACRO.format(mass=1, more=more))
 
 
 def test_eval_and_units_of_tables_run_nothing(tmp_path: Path) -> None:
-    path = tmp_path / "arm.xacro"
-    mark = tmp_path / "written"
-    program = f"[x.{RUN.replace('written', str(mark))} for x in [{GLOBALS}['os']]]"
-    (tmp_path / "t.yaml").write_text(f'a: !degrees "{program}"\n')
-    ways = ("$(eval find.__globals__['os'])", "${xacro.load_yaml('t.yaml')['a']}")
-    for mass in ways:
-        path.write_text(ARM.format(mass=escaped(mass), more=""))
-        assert "nothing in a robot's file is run" in refused(path)
-    assert not mark.exists()
+    (tmp_path / "t.yaml").write_text(f'a: !degrees "[{of(tmp_path)} for x in [1]]"\n')
+    for mass in ("$(eval find.__globals__['os'])", "${xacro.load_yaml('t.yaml')['a']}"):
+        refused(tmp_path / "arm.xacro", XACRO.format(mass=escaped(mass), more=""))
 
 
 def test_a_urdf_that_is_a_xacro_runs_nothing(tmp_path: Path) -> None:
-    program = escaped(f"(lambda: {GLOBALS}['os'].system('touch {tmp_path}/written'))()")
-    (tmp_path / "arm.xacro").write_text(ARM.format(mass=f"${{{program}}}", more=""))
+    program = f"${{{escaped(of(tmp_path))}}}"
+    (tmp_path / "arm.xacro").write_text(XACRO.format(mass=program, more=""))
     path = tmp_path / "arm.urdf"
-    path.write_text(
-        '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="a">'
-        '<xacro:include filename="arm.xacro"/></robot>'
-    )
-    assert "nothing in a robot's file is run" in refused(path)
-    run = subprocess.run(
-        [sys.executable, "-m", "excite_cli", "robots", str(path)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    refused(path, '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="a">'
+                  '<xacro:include filename="arm.xacro"/></robot>')  # fmt: skip
+    run = subprocess.run([*EXCITE, "robots", path], capture_output=True, text=True, check=False)
     assert run.returncode == 2
     assert "nothing in a robot's file is run" in " ".join(run.stderr.split())
     assert not (tmp_path / "written").exists()
@@ -177,6 +158,4 @@ def test_a_urdf_that_is_a_xacro_runs_nothing(tmp_path: Path) -> None:
     ],
 )
 def test_what_descriptions_compute_is_computed(text: str, value: object) -> None:
-    table = symbols({"load_yaml": dict, "abs_filename": str, "dotify": dict})
-    names = {**table, "d": {"a": {"b": 2}}}
-    assert evaluate(text, names, table) == value
+    assert evaluate(text, {**TABLE, "d": {"a": {"b": 2}}}, TABLE) == value

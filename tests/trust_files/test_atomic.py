@@ -14,6 +14,7 @@ from excite_cli.atomic import write_atomically, write_folder_atomically
 from excite_cli.disk_cache import store_arrays, stored_arrays
 from excite_cli.errors import FileError
 from excite_cli.export.motions import MOTION_EXPORTERS
+from excite_cli.measurement.hdf5_writer import new_hdf5
 from excite_cli.measurement.timed_motion import TimedMotion
 
 WRITERS = pytest.mark.parametrize("write", [write_atomically, write_folder_atomically])
@@ -58,25 +59,17 @@ def test_a_refusal_is_one_message_and_leaves_nothing(
 def test_a_folder_takes_the_place_of_another(
     one_step: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if not one_step:
-        monkeypatch.setattr(atomic.ctypes, "CDLL", lambda *_, **__: object())
-    for text in ("old", "new"):
-        write_folder_atomically(tmp_path / "bag", bag(text))
-    assert (tmp_path / "bag" / "metadata.yaml").read_text() == "new"
-    assert [each.name for each in tmp_path.iterdir()] == ["bag"]
-
-
-def test_an_old_folder_is_exchanged_in_one_step(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    write_folder_atomically(tmp_path / "bag", bag("old"))
-
     def never(*_: object) -> None:
         raise AssertionError("there would be an instant without a bag")
 
-    monkeypatch.setattr(atomic.os, "replace", never)
+    write_folder_atomically(tmp_path / "bag", bag("old"))
+    if one_step:
+        monkeypatch.setattr(atomic.os, "replace", never)
+    else:
+        monkeypatch.setattr(atomic.ctypes, "CDLL", lambda *_, **__: object())
     write_folder_atomically(tmp_path / "bag", bag("new"))
     assert (tmp_path / "bag" / "metadata.yaml").read_text() == "new"
+    assert [each.name for each in tmp_path.iterdir()] == ["bag"]
 
 
 def test_all_is_on_the_disk_before_it_is_in_place(
@@ -92,20 +85,19 @@ def test_all_is_on_the_disk_before_it_is_in_place(
     assert steps == [".part", "replace", tmp_path.name[-5:]]
 
 
-def test_a_link_stays_and_its_file_is_written(tmp_path: Path) -> None:
+def test_a_link_stays_and_devices_and_folders_are_never_replaced(tmp_path: Path) -> None:
+    def write(name: str) -> None:
+        write_atomically(tmp_path / name, lambda file: file.write_text("1"))
+
     (tmp_path / "far").mkdir()
     (tmp_path / "out.h5").symlink_to(tmp_path / "far" / "real.h5")
-    write_atomically(tmp_path / "out.h5", lambda file: file.write_text("1"))
+    write("out.h5")
     assert (tmp_path / "out.h5").is_symlink()
     assert (tmp_path / "far" / "real.h5").read_text() == "1"
-
-
-def test_devices_and_folders_are_never_replaced(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(FileError, match="not a regular file"):
-        write_atomically(tmp_path / "pipe", lambda file: file.write_text("1"))
-    with pytest.raises(FileError, match="is a folder"):
-        write_atomically(tmp_path, lambda file: file.write_text("1"))
+    for name, words in (("pipe", "not a regular file"), ("far", "is a folder")):
+        with pytest.raises(FileError, match=words):
+            write(name)
     assert (tmp_path / "pipe").is_fifo()
 
 
@@ -113,17 +105,18 @@ def test_a_cache_that_cannot_be_written_is_no_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    key, arrays = "k" * 32, {"a": np.ones(3)}
     (tmp_path / "excite").write_text("a file in the place of the folder")
-    store_arrays("k" * 32, {"a": np.ones(3)})
-    assert stored_arrays("k" * 32) is None
+    store_arrays(key, arrays)
+    assert stored_arrays(key) is None
     (tmp_path / "excite").unlink()
-    store_arrays("k" * 32, {"a": np.ones(3)})
-    found = stored_arrays("k" * 32)
+    store_arrays(key, arrays)
+    found = stored_arrays(key)
     assert found is not None
     assert found["a"].tolist() == [1.0, 1.0, 1.0]
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setenv("HOME", "/nonexistent/home")
-    store_arrays("k" * 32, {"a": np.ones(3)})  # nor is a home that is not there
+    store_arrays(key, arrays)  # nor is a home that is not there
 
 
 def test_a_bag_that_fills_the_disk_is_told_as_any_file(
@@ -140,3 +133,9 @@ def test_a_bag_that_fills_the_disk_is_told_as_any_file(
     with pytest.raises(FileError, match="bag cannot be written: no space is left on the disk"):
         MOTION_EXPORTERS["rosbag2"].write(tmp_path / "bag", motion)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_fails_once_for_an_hdf5_file(capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(OSError, match="No space left"), new_hdf5(Path("/dev/full")) as file:
+        file["zeros"] = [0.0] * 1000
+    assert capfd.readouterr().err == ""

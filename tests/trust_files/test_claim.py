@@ -13,6 +13,10 @@ from excite_cli.claim import claim, claimed
 from excite_cli.errors import FileError
 
 
+def names(folder: Path) -> set[str]:
+    return {each.name for each in folder.iterdir()}
+
+
 class Other:
     """Another process that does `action` and then waits to be killed."""
 
@@ -52,16 +56,14 @@ def test_a_second_run_is_refused_and_told_who_has_it_until_the_first_is_killed(
     with claimed(tmp_path / "other.h5"):  # the claim is on one file, not on the folder
         pass
     other.kill()
-    assert [each.name for each in tmp_path.iterdir()] == [".out.h5.lock"]
+    assert names(tmp_path) == {".out.h5.lock"}
+    with claimed(path):  # the same run may write what it has claimed
+        write_atomically(path, lambda file: file.write_text("mine"))
+        assert names(tmp_path) == {".out.h5.lock", "out.h5"}
+    assert names(tmp_path) == {"out.h5"}
+    path.unlink()
     write_atomically(path, lambda file: file.write_text("mine"))
-    assert [each.name for each in tmp_path.iterdir()] == ["out.h5"]
-
-
-def test_the_same_run_may_write_what_it_has_claimed(tmp_path: Path) -> None:
-    with claimed(tmp_path / "out.h5"):
-        write_atomically(tmp_path / "out.h5", lambda file: file.write_text("1"))
-        assert (tmp_path / ".out.h5.lock").exists()
-    assert [each.name for each in tmp_path.iterdir()] == ["out.h5"]
+    assert names(tmp_path) == {"out.h5"}
 
 
 def test_a_worker_that_outlives_its_run_does_not_keep_the_claim(tmp_path: Path) -> None:
@@ -88,25 +90,22 @@ def test_a_worker_that_outlives_its_run_does_not_keep_the_claim(tmp_path: Path) 
 def test_what_a_killed_run_left_is_removed_and_nothing_else(tmp_path: Path) -> None:
     path = tmp_path / "out.h5"
 
-    def write() -> None:
-        def die(file: Path) -> None:
-            file.write_text("half")
-            os.kill(os.getpid(), signal.SIGKILL)
-
-        write_atomically(path, die)
+    def die(file: Path) -> None:
+        file.write_text("half")
+        os.kill(os.getpid(), signal.SIGKILL)
 
     process = os.fork()
     if not process:
-        write()
+        write_atomically(path, die)
     os.waitpid(process, 0)
-    left = [each.name for each in tmp_path.iterdir()]
+    left = names(tmp_path)
     assert len(left) == 2
     assert any(name.startswith(".out.h5.") and name.endswith(".part") for name in left)
     others = {".out.h5.old.abcdefgh.part", ".out.h5.bak", "out.h5.part", ".out.h5.ABCDEFGH.part"}
     for name in others:
         (tmp_path / name).write_text("somebody's")
     write_atomically(path, lambda file: file.write_text("whole"))
-    assert {each.name for each in tmp_path.iterdir()} == {*others, "out.h5"}
+    assert names(tmp_path) == {*others, "out.h5"}
 
 
 def test_folders_made_for_a_run_that_wrote_nothing_go_with_it(tmp_path: Path) -> None:
@@ -127,7 +126,7 @@ def test_without_locks_of_the_file_system_files_are_written_all_the_same(
     others = tmp_path / ".out.h5.abcdefgh.part"  # nobody can tell whether that run is alive
     others.write_text("half")
     write_atomically(tmp_path / "out.h5", lambda file: file.write_text("1"))
-    assert {each.name for each in tmp_path.iterdir()} == {"out.h5", others.name}
+    assert names(tmp_path) == {"out.h5", others.name}
 
 
 def test_a_lock_file_that_never_is_what_its_name_says_is_no_lock(
@@ -144,4 +143,4 @@ def test_a_lock_file_that_never_is_what_its_name_says_is_no_lock(
     (tmp_path / ".out.h5.abcdefgh.part").write_text("half")
     with claimed(tmp_path / "out.h5"):
         pass
-    assert [each.name for each in tmp_path.iterdir()] == [".out.h5.abcdefgh.part"]
+    assert names(tmp_path) == {".out.h5.abcdefgh.part"}

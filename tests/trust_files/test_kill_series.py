@@ -13,6 +13,7 @@ from benchmarks.trust.kill_start import Start
 from benchmarks.trust.kill_trial import Series, Tally, undisturbed
 from excite_cli.atomic import write_atomically
 
+Killed = Callable[[Callable[[], None]], Tally]
 WHOLE = "x" * 4096
 PART = 64
 
@@ -53,32 +54,36 @@ def forking(write: Callable[[], None]) -> Start:
     return start
 
 
-def killed(write: Callable[[], None], folder: Path, old: bool) -> Tally:
-    start = forking(write)
-    reference = undisturbed(start, COMMAND, folder / "reference")
-    series = Series(start, COMMAND, reference, folder / "series", reference.folder if old else None)
-    return series.play(20, np.random.default_rng(1))
+@pytest.fixture(params=[True, False], ids=["over-old", "new"])
+def killed(request: pytest.FixtureRequest, tmp_path: Path) -> Killed:
+    """Kills it twenty times, over an old file or without one."""
+
+    def series(write: Callable[[], None]) -> Tally:
+        start = forking(write)
+        reference = undisturbed(start, COMMAND, tmp_path / "reference")
+        old = reference.folder if request.param else None
+        played = Series(start, COMMAND, reference, tmp_path / "series", old)
+        return played.play(20, np.random.default_rng(1))
+
+    return series
 
 
-@pytest.mark.parametrize("old", [True, False], ids=["over-old", "new"])
-def test_a_file_written_in_place_is_found_broken(old: bool, tmp_path: Path) -> None:
-    tally = killed(lambda: slowly(Path("out.txt")), tmp_path, old)
+def test_a_file_written_in_place_is_found_broken(killed: Killed) -> None:
+    tally = killed(lambda: slowly(Path("out.txt")))
     assert any("out.txt is broken" in why for why in tally.broken)
 
 
-@pytest.mark.parametrize("old", [True, False], ids=["over-old", "new"])
-def test_a_file_put_in_place_whole_is_not(old: bool, tmp_path: Path) -> None:
-    tally = killed(lambda: write_atomically(Path("out.txt"), slowly), tmp_path, old)
+def test_a_file_put_in_place_whole_is_not(killed: Killed) -> None:
+    tally = killed(lambda: write_atomically(Path("out.txt"), slowly))
     assert tally.broken == []
     assert tally.kills >= 10
     assert tally.writing >= 1
     assert tally.finished == 1
 
 
-def test_what_nobody_would_know_is_told(tmp_path: Path) -> None:
+def test_what_nobody_would_know_is_told(killed: Killed) -> None:
     def write() -> None:
         slowly(Path("out.tmp"))
         os.replace("out.tmp", "out.txt")
 
-    tally = killed(write, tmp_path, True)
-    assert any("out.tmp was left" in why for why in tally.broken)
+    assert any("out.tmp was left" in why for why in killed(write).broken)

@@ -1,4 +1,4 @@
-"""The installed program: two runs on one output, stopped runs, places that cannot be written."""
+"""The installed program: runs on one output, stopped, in other places; what they leave is told."""
 
 import os
 import signal
@@ -10,21 +10,16 @@ from typing import Any
 import pytest
 import typer
 
+from benchmarks.trust.kill_commands import numbers
 from excite_cli.cli.app import app
 from excite_cli.cli.ending import run_guarded
 from tests.cli.program import EXCITE, SMOKE, Installed, environment
+from tests.end_to_end.conftest import cache, excite
 
+__all__ = ["cache", "excite"]
+
+SHORT = ("--motions", "1", "--set", "optimizer.max_iterations=4", "--quiet")
 LONG = ("optimize", SMOKE, "--motions", "9", "--set", "optimizer.max_iterations=300")
-
-
-@pytest.fixture(scope="module")
-def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("cache")
-
-
-@pytest.fixture
-def excite(tmp_path: Path, cache: Path) -> Installed:
-    return Installed(tmp_path, cache)
 
 
 def test_two_runs_on_one_output_and_a_stop(excite: Installed) -> None:
@@ -97,3 +92,23 @@ def test_a_file_that_outgrows_its_limit_leaves_the_old_one(excite: Installed) ->
     assert "s.json cannot be written: it is larger than files may be here" in run.stderr
     assert os.listdir(excite.folder) == ["s.json"]
     assert (excite.folder / "s.json").read_text() == "old"
+
+
+def test_hashes_threads_language_and_caches_change_no_bit(tmp_path: Path) -> None:
+    """The same seed gives the same numbers, whatever differs around the process."""
+    others = {
+        "one": {"PYTHONHASHSEED": "1", "OPENBLAS_NUM_THREADS": "1"},
+        "two": {"PYTHONHASHSEED": "2", "OPENBLAS_NUM_THREADS": "2", "LC_ALL": "tr_TR.UTF-8"},
+    }
+    found = []
+    for name, changes in others.items():
+        folder = tmp_path / name
+        folder.mkdir()
+        subprocess.run(
+            [*EXCITE, "optimize", SMOKE, "-o", "out.h5", *SHORT], check=True, cwd=folder,
+            env={**environment(folder / "cache"), **changes}, stdin=subprocess.DEVNULL,
+            capture_output=True,
+        )  # fmt: skip
+        found.append(numbers(folder / "out.h5"))
+    assert "motions/1/coefficients" in found[0]
+    assert found[0] == found[1]
