@@ -48,10 +48,11 @@ def found_section(found: Diagnosis) -> Section:
                 title="What the declared model lacks",
                 right=frozenset({3, 4, 5}),
                 note=(
-                    "share: part of the fall of the mean held-out error (Shapley value: averaged over "
-                    "orders of joining, so that all rows add up to it); gain: by which the error on "
-                    "training data left out falls; held-out, without it: the verdict, and by how "
-                    "much the error of the most affected joint rises if the effect is left out."
+                    "share: part of the fall of the mean held-out error (Shapley value: averaged "
+                    "over orders of joining, so that all rows add up to it); gain: by which the "
+                    "error on training data left out falls; held-out, without it: the verdict, and "
+                    "by how much the error of the most affected joint rises if the effect is left "
+                    "out."
                 ),
             )
         )
