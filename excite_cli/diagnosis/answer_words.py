@@ -7,7 +7,7 @@ parts of the effects (`error_parts`) add up to it.
 from collections.abc import Sequence
 from math import inf, isnan
 
-from excite_cli.diagnosis.records import Diagnosis, NamedEffect, mean_of_known
+from excite_cli.diagnosis.records import OPEN_SETUP, Diagnosis, NamedEffect, mean_of_known
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.diagnosis.words import (
     counted,
@@ -184,6 +184,8 @@ def _next(found: Diagnosis) -> str:
     """What to do: tell apart what fits as well, by a motion, or go on with what was found."""
     if not found.effects:
         return ""
+    if any(each.kind == OPEN_SETUP for each in found.findings):
+        return "Next: resolve the doubt about the set-up (excite inspect), and diagnose again."
     if _in_vain(found):
         warned = sum(each.severity == "warning" for each in found.findings)
         first_of_all = f"resolve {counted(warned, 'warning')} about the data"

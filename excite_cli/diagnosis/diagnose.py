@@ -32,6 +32,7 @@ from excite_cli.diagnosis.naming import information_of, named_effects, rounds_of
 from excite_cli.diagnosis.own_torque import at_its_own_torque
 from excite_cli.diagnosis.records import (
     CUT_SHORT,
+    OPEN_SETUP,
     Approximation,
     Assumption,
     Diagnosis,
@@ -79,7 +80,7 @@ from excite_cli.robot.tree import skeleton_of
 Progress = Callable[[str, int], None]
 # Of 74 logs set up wrongly by little, effects of other names were confirmed in 18 without this.
 _OPEN = Finding(
-    "open_setup",
+    OPEN_SETUP,
     "warning",
     "The set-up is in doubt (above): until it is resolved, no effect beyond the textbook's is "
     "confirmed. The keys that resolve it: excite inspect",

@@ -244,6 +244,7 @@ class Information:
     noise: Annotated[Array, shape("n", finite=True)]
 
 
+OPEN_SETUP = "open_setup"  # the kind of a finding: the set-up is in doubt
 CUT_SHORT = "cut_short"  # the kind of a finding: the search did not come to its end
 _UNCHANGED = 0.02  # of an error that no effect concerns
 

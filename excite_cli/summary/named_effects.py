@@ -99,6 +99,10 @@ def effect_parts(found: Diagnosis, verbose: bool) -> Parts:
             f"and {len(small)} small effects (each below {SMALL_PART:.0%} of the error reduction): "
             f"{listed} (--verbose: sizes)"
         )
+    if found.harmful:
+        parts.append(
+            "Harmful effects stay in the model: held-out data judge it, and choose nothing in it."
+        )
     parts += weighed_in_words(found)
     parts += [text for each in named for text in other_names(each, everything)]
     told = (
