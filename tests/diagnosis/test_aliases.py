@@ -17,8 +17,7 @@ from excite_cli.effects.base import Effect
 from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.torque_offset import TorqueOffset
 from excite_cli.effects.viscous_friction import ViscousFriction
-from tests.diagnosis.explicit_data import FIXED, prepared
-from tests.diagnosis.test_judgement import judge_of, planted
+from tests.diagnosis.explicit_data import FIXED, judge_of, planted, prepared
 
 SAMPLES = 400
 NAMED, NEAR, FAR, ELSEWHERE, WIDE = range(5)
@@ -149,7 +148,7 @@ def jointly(first: float, second: float, chosen: Sequence[int]) -> list:
     effects = [TorqueOffset((0,)), Armature((0,)), ViscousFriction((0,))]
     mix = np.array([[1.0, 1.0, 0.0], [1.0, 0.0, 1.0]])
     torque = np.array([[first, 0.0], [second, 0.0]])
-    return joint_aliases(chosen, judge_of(*planted(effects, mix, torque)), chosen)
+    return joint_aliases(chosen, judge_of(*planted(effects, torque, mix)), chosen)
 
 
 def test_two_together_may_stand_for_one_and_one_for_two() -> None:
@@ -164,12 +163,12 @@ def test_one_of_another_ratio_does_not_stand_for_two() -> None:
 def test_a_pair_is_not_told_where_one_of_it_is_enough() -> None:
     effects = [TorqueOffset((0,)), Armature((0,)), ViscousFriction((0,))]
     mix = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    judge = judge_of(*planted(effects, mix, np.array([[3.0, 0.0], [0.0, 0.0]])))
+    judge = judge_of(*planted(effects, np.array([[3.0, 0.0], [0.0, 0.0]]), mix))
     assert joint_aliases([0], judge, [0]) == []
 
 
 def test_a_vetoed_pair_stands_for_nothing() -> None:
     effects = [TorqueOffset((0,)), Armature((0,)), ViscousFriction((0,))]
     mix = np.array([[1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])  # the friction would be negative
-    judge = judge_of(*planted(effects, mix, np.array([[3.0, 0.0], [-3.0, 0.0]])))
+    judge = judge_of(*planted(effects, np.array([[3.0, 0.0], [-3.0, 0.0]]), mix))
     assert joint_aliases([0], judge, [0]) == []

@@ -16,8 +16,7 @@ from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array
-from tests.diagnosis.explicit_data import FOLDS, prepared, usual_of_unit_columns
-from tests.diagnosis.test_misspecification import planted, traced
+from tests.diagnosis.explicit_data import FOLDS, planted, prepared, traced, usual_of_unit_columns
 
 SAMPLES = 400
 FIXED = 3

@@ -10,21 +10,16 @@ from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.identification.least_squares import fit_rows
-from tests.diagnosis.test_misspecification import planted, traced
+from tests.diagnosis.explicit_data import effect, planted, traced
 
 
 def told(given: SearchResult) -> FinalFit:
     return final_fit(given, fit_rows(given.data.rows(given.candidates, given.chosen)))
 
 
-def one(kind: str, *joints: int) -> Effect:
-    effect = catalogue()[kind]
-    return effect(joints or (0,), {p.name: p.low for p in effect.shapes})
-
-
 def test_sizes_are_told_beside_two_standard_deviations() -> None:
     """The second is beyond its noise of 0.05, the third is not."""
-    effects = [one("viscous_friction"), one("armature"), one("torque_offset")]
+    effects = [effect("viscous_friction"), effect("armature"), effect("torque_offset")]
     torque = np.array([[3.0, 0.0], [1.0, 0.0], [0.01, 0.0]])
     data, candidates = planted(effects, torque)
     given = traced(data, candidates, (0, 1, 2))
@@ -36,13 +31,12 @@ def test_sizes_are_told_beside_two_standard_deviations() -> None:
 
 
 def test_deviations_hold_what_the_columns_of_an_effect_miss() -> None:
-    data, candidates = planted([one("elasticity")], np.array([[2.0, 0.0]]))
+    data, candidates = planted([effect("elasticity")], np.array([[2.0, 0.0]]))
     given = traced(data, candidates, (0,))
-    effect = candidates[0].effect
     found = told(given)
-    missed = effect.model_error(found.parameters[-1:])[0]
+    missed = candidates[0].effect.model_error(found.parameters[-1:])[0]
     assert missed > 0.1
-    exact = replace(given, candidates=(replace(candidates[0], effect=one("armature")),))
+    exact = replace(given, candidates=(replace(candidates[0], effect=effect("armature")),))
     noise = told(exact).covariance[-1, -1]
     assert found.covariance[-1, -1] == pytest.approx(noise + missed**2)
 
@@ -56,7 +50,7 @@ def test_a_payload_is_moved_to_a_body_and_all_that_depends_on_it_too() -> None:
     body[4] = -0.01  # as fitted, with an error of 0.05
     torque = mix @ np.array([2.0, *body])
     data, candidates = planted(
-        [one("viscous_friction"), one("payload")], np.outer(torque, [1.0, 0.0]), mix
+        [effect("viscous_friction"), effect("payload")], np.outer(torque, [1.0, 0.0]), mix
     )
     given = traced(data, candidates, (0, 1))
     fitted = given.judge.plain.solve((0, 1))[-width:]

@@ -22,8 +22,7 @@ from excite_cli.effects.catalogue import catalogue
 from excite_cli.identification.declared_states import LeftOut
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array
-from tests.diagnosis.explicit_data import anything, effect
-from tests.diagnosis.test_judgement import TOTAL, on_joint_0, planted
+from tests.diagnosis.explicit_data import TOTAL, anything, effect, on_joint_0, planted
 from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
 
@@ -77,7 +76,7 @@ REFINED: Mapping[str, tuple[str, ...]] = {
 
 def a_search(effects: Sequence[Effect], mix: Array, torque: Sequence[float]) -> Search:
     """On columns of joint 0 that are orthogonal directions times `mix`; noise is of RMS one."""
-    data, candidates = planted(effects, mix, on_joint_0(torque))
+    data, candidates = planted(effects, on_joint_0(torque), mix)
     plain = data.evidence(candidates, NoiseModel.white(np.ones(2)))
     return Search(Judgement(plain, plain, candidates, NO_VETO, anything))
 

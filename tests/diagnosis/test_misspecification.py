@@ -1,37 +1,31 @@
 """Effects that only come near something else, by what is left beside them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.covariate import Covariate
-from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.misspecification import approximations
-from excite_cli.diagnosis.noise_model import NoiseModel
-from excite_cli.diagnosis.possible_sizes import PossibleSizes
 from excite_cli.diagnosis.records import Approximation, LargeRest
-from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.diagnosis.training import TrainingData
-from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
-from excite_cli.effects.seen import Seen
-from excite_cli.robot.model import Array
-from tests.diagnosis.explicit_data import FIXED, FOLDS, anything, prepared
+from tests.diagnosis.explicit_data import (
+    FIXED,
+    FOLDS,
+    SAMPLES,
+    Allowed,
+    effect,
+    planted,
+    prepared,
+    traced,
+)
 from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
 
 NAMES = ("a", "b")
-SAMPLES = 60
-ONE = NoiseModel.white(np.ones(2))
-Allowed = Callable[[Array, Sequence[int], Sequence[int]], bool]
-
-
-def effect(kind: str, *joints: int) -> Effect:
-    return catalogue()[kind](joints or (0,))
 
 
 def left(joint: str, *codes: str, share: float) -> LargeRest:
@@ -44,62 +38,9 @@ def function_of(*codes: str) -> Approximation:
     return Approximation(tuple(Covariate.of_code(code) for code in codes))
 
 
-NO_MODEL: Any = None  # none of what is tried here asks for it
-NO_MOTION: Any = None
-
-
 def all_but(vetoed: int) -> Allowed:
     """A veto of one candidate."""
     return lambda parameters, chosen, added: vetoed not in added
-
-
-def traced(
-    data: TrainingData,
-    candidates: Sequence[Candidate],
-    chosen: Sequence[int],
-    allowed: Allowed = anything,
-) -> SearchResult:
-    plain = data.evidence(candidates, ONE)
-    judge = Judgement(plain, plain, candidates, Rules(0.01, 0.01), allowed)
-    return SearchResult(
-        data, tuple(candidates), ONE, judge, tuple(chosen), np.zeros(0), (), np.ones(2), 1.0,
-        PossibleSizes(candidates, plain.covariance, Seen(np.ones(2), np.ones(2), 1.0)), NO_MODEL,
-        NO_MOTION,
-    )  # fmt: skip
-
-
-def planted(
-    effects: Sequence[Effect], torque: Array, mix: Array | None = None
-) -> tuple[TrainingData, list[Candidate]]:
-    """Orthogonal columns, times `mix`, on all joints of each effect, and noise of RMS one.
-
-    `torque` (columns, joints) is the RMS of each direction in the torque: so the energies that
-    effects explain are known.
-    """
-    rng = np.random.default_rng(0)
-    count = len(torque)
-    declared, columns, tau = [], [], []
-    for _ in FOLDS:
-        free = np.linalg.qr(rng.normal(size=(SAMPLES, FIXED + count + 2)))[0] * np.sqrt(SAMPLES)
-        declared.append(np.repeat(free[:, None, :FIXED], 2, axis=1))
-        own = free[:, FIXED : FIXED + count]
-        columns.append(own if mix is None else own @ mix)
-        tau.append(own @ torque + free[:, FIXED + count :])
-    candidates, at = [], 0
-    for one in effects:
-        width = len(one.parameters)
-        candidates.append(
-            Candidate(
-                one,
-                one.joints,
-                tuple(
-                    np.repeat(x[:, None, at : at + width], len(one.joints), axis=1) for x in columns
-                ),
-            )
-        )
-        at += width
-    runs = tuple(prepared(np.ones((SAMPLES, 2), bool)) for _ in FOLDS)
-    return TrainingData(runs, FOLDS, tuple(declared), tuple(tau)), candidates
 
 
 def beside(kind: str, words: Sequence[str], energy: float, joints: tuple[int, ...] = (0,)) -> bool:
@@ -251,8 +192,7 @@ def test_what_cannot_be_on_another_joint_is_no_matter() -> None:
 
 
 def test_another_shape_of_a_chosen_effect_is_no_rival() -> None:
-    kind = catalogue()["stribeck_friction"]
-    effects = [kind((0,), {"stribeck_speed": 0.1}), kind((0,), {"stribeck_speed": 0.2})]
+    effects = [effect("stribeck_friction", stribeck_speed=speed) for speed in (0.1, 0.2)]
     data, candidates = planted(effects, np.array([[1.0, 0.0], [9.0, 0.0]]))
     assert approximations(traced(data, candidates, [0], all_but(1)), NAMES, []) == {}
 
@@ -331,7 +271,7 @@ def test_a_wave_that_was_not_seen_to_repeat_is_doubted_beside_a_large_rest(
     robot = random_robot(4, joints=3, branches=False, prismatic=False)
     signals = signals_of(robot, samples=SAMPLES)
     periods = 2 * np.pi * cycles / float(np.ptp(signals.q[:, 0]))
-    wave, constant = catalogue()["ripple"]((0,), {"periods": periods}), effect("torque_offset")
+    wave, constant = effect("ripple", periods=periods), effect("torque_offset")
     torque = np.array([[10.0, 0.0], [10.0, 0.0], [3.0, 0.0]])
     data, candidates = planted([wave, constant], torque)
     there = replace(traced(data, candidates, [0, 1]), signals=(signals,) * len(FOLDS))
@@ -348,7 +288,7 @@ def test_friction_is_the_mean_of_what_varies_it_and_is_none(
     size: float, expected: set[int]
 ) -> None:
     """Coulomb friction of energy 49 or 25 beside one that varies it, of 10, with 2 left."""
-    varied = catalogue()["position_friction"]((0,), {"periods": 1.0, "power": 0.0})
+    varied = effect("position_friction", periods=1.0, power=0.0)
     torque = np.array([[size, 0.0], [np.sqrt(10.0), 0.0], [0.0, 0.0], [1.4, 0.0]])
     data, candidates = planted([effect("coulomb_friction"), varied], torque)
     rests = [left("a", "q[a]", share=0.7)]

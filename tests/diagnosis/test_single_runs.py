@@ -16,8 +16,7 @@ from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.identification.split import Split
 from excite_cli.measurement.dataset import Run
 from excite_cli.measurement.run_identity import Part, RunId
-from tests.diagnosis.explicit_data import prepared
-from tests.diagnosis.test_misspecification import traced
+from tests.diagnosis.explicit_data import prepared, traced
 
 JOINTS = ("a", "b")
 

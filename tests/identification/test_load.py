@@ -19,7 +19,6 @@ from excite_cli import (
 from excite_cli.api.load_planning import LoadProblem
 from excite_cli.api.loading import Case
 from excite_cli.config.data_spec import EffectSpec
-from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.identification.load import expected_load
 from excite_cli.identification.stored_model import StoredFit
@@ -30,28 +29,21 @@ from tests.cli.program import SMOKE, Program
 
 pytest.importorskip("mujoco")
 
-from excite_cli.simulation.ground_truth import Planted, plant
 from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
-from tests.diagnosis.test_changes import motion
+from tests.diagnosis.simulated_arm import ROBOT, SLIDE, Planted, planted, played
 
 MASS, CENTRE = 1.8, (0.03, -0.02, 0.06)
 DECLARED = "effects: [{kind: viscous_friction}, {kind: coulomb_friction}]\n"
 
 
-def friction(joints: int) -> list[Planted]:
-    return [
-        plant(kind_named(kind), (j,), 1.0)
-        for kind in ("viscous_friction", "coulomb_friction")
-        for j in range(joints)
-    ]
-
-
-def carried(joint: int, *runs: str) -> Planted:
-    others = dict(zip(("cx", "cy", "cz"), CENTRE, strict=True))
-    one = plant(kind_named("payload"), (joint,), MASS, others)
-    return replace(one, effect=replace(one.effect, runs=runs))
+def loaded_arm(*runs: int) -> list[Planted]:
+    """Friction of all joints, and the load in some runs."""
+    kinds = ("viscous_friction", "coulomb_friction")
+    friction = [planted(kind, j, 1.0) for kind in kinds for j in range(ROBOT.n)]
+    centre = dict(zip(("cx", "cy", "cz"), CENTRE, strict=True))
+    return [*friction, planted("payload", SLIDE, MASS, *runs, **centre)]
 
 
 @pytest.fixture(scope="module")
@@ -69,12 +61,9 @@ def case(folder: Path) -> Case:
 
 
 @pytest.fixture(scope="module")
-def runs(case: Case) -> Dataset:
+def runs() -> Dataset:
     """Four without a load, one with it."""
-    motions = [motion(case.robot, number) for number in range(1, 6)]
-    effects = [*friction(case.robot.n), carried(case.robot.n - 1, "r5")]
-    settings = SimulationSettings(rate=200.0, lead_in=0.5)
-    return simulate(case.robot, motions, settings, effects).dataset
+    return played(loaded_arm(5), range(1, 6), 4.0)
 
 
 @pytest.fixture(scope="module")
@@ -167,11 +156,9 @@ def test_the_planned_motion_tells_a_load_as_well_as_expected(
 ) -> None:
     (step,) = plan(planned.problem).motions
     assert all(step.certified.values())
-    played = PlannedMotion("load", planned.problem.trajectory, step.coefficients)
-    robot = case.robot
+    motion_of_load = PlannedMotion("load", planned.problem.trajectory, step.coefficients)
     settings = SimulationSettings(rate=200.0, lead_in=0.5)
-    effects = [*friction(robot.n), carried(robot.n - 1, "load")]
-    data = simulate(robot, [played], settings, effects).dataset
+    data = simulate(ROBOT, [motion_of_load], settings, loaded_arm()).dataset
     told = identify_load(case, data, fit).parameters
     assert told["mass"].value == pytest.approx(MASS, rel=0.01)
     centre = [told[name].value for name in ("cx", "cy", "cz")]
