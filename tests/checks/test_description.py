@@ -207,6 +207,11 @@ def test_shapes_that_cannot_be_read_are_none(tmp_path: Path) -> None:
     (tmp_path / "arms.urdf").write_text(text, encoding="utf-8")
     found = of_description(build_robot(RobotSpec(urdf="arms.urdf"), tmp_path))
     assert [each.joints for each in found] == [("to_left_1", "to_right_1")]
+    # Rows of inspect without data.
+    (tmp_path / "arms.urdf").write_text(urdf_of(arms(5)), encoding="utf-8")
+    found = inspect(load_case({"robot": {"urdf": str(tmp_path / "arms.urdf")}}))
+    assert tuple(each.name for each in found.results) == NAMES[:4]
+    assert all(each.status == "ok" for each in found.results)
 
 
 def test_the_ground_is_in_no_torque() -> None:
@@ -217,10 +222,3 @@ def test_the_ground_is_in_no_torque() -> None:
     assert judged(links, joints=joints)[0].joints == tuple(joints)
     floating = judged(links, joints=joints, base="floating", rows=("base", "joints"))
     assert "left_0" in floating[0].evidence
-
-
-def test_rows_of_inspect_without_data(tmp_path: Path) -> None:
-    (tmp_path / "arms.urdf").write_text(urdf_of(arms(5)), encoding="utf-8")
-    found = inspect(load_case({"robot": {"urdf": str(tmp_path / "arms.urdf")}}))
-    assert tuple(each.name for each in found.results) == NAMES[:4]
-    assert all(each.status == "ok" for each in found.results)

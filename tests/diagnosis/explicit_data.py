@@ -162,45 +162,15 @@ class Rows:
         misfit = self.known[:, :-1] @ theta[:FIXED] - self.known[:, -1]
         return own + with_known * float(misfit @ misfit)
 
-    def left_out(self, chosen: Sequence[int], joints: Sequence[int]) -> list[float]:
-        """Energy per fold on the rows of `joints`, fitted to the other folds."""
-        found = []
-        for fold in range(max(FOLDS) + 1):
-            theta = self._refitted(chosen, self.fitted(chosen, self.fold != fold), fold)
-            found.append(self._energy(chosen, theta, (self.fold == fold), joints))
-        return found
-
-    def on_blocks(self, chosen: Sequence[int], new: bool) -> Array:
-        """Energy (joints, 2 folds) of the sides of folds: as those of `new` recordings, fitted to
-        the other folds, or fitted to the other sides of all."""
+    def on_blocks(self, chosen: Sequence[int]) -> Array:
+        """Energy (joints, 2 folds) of the sides of folds, fitted to the other sides of all."""
         found = np.zeros((2, max(FOLDS) + 1, 2))
         for joint, fold, side in np.ndindex(found.shape):
-            kept = self.fold != fold if new else self.side != bool(side)
-            here = (self.fold == fold) & (self.side == bool(side))
-            found[joint, fold, side] = self._energy(
-                chosen, self.fitted(chosen, kept), here, [joint]
-            )
+            here = (self.fold == fold) & (self.side == bool(side)) & (self.joint == joint)
+            theta = self.fitted(chosen, self.side != bool(side))
+            rest = self.y[here] - self.x[here][:, self.columns(chosen)] @ theta
+            found[joint, fold, side] = float(rest @ rest)
         return found.reshape(2, -1)
-
-    def _energy(
-        self, chosen: Sequence[int], theta: Array, here: np.ndarray, joints: Sequence[int]
-    ) -> float:
-        rows = here & np.isin(self.joint, joints)
-        rest = self.y[rows] - self.x[rows][:, self.columns(chosen)] @ theta
-        return float(rest @ rest)
-
-    def _refitted(self, chosen: Sequence[int], theta: Array, fold: int) -> Array:
-        """What is there in this fold alone, fitted to it, all else held."""
-        at = self.columns(chosen)
-        there = np.array([np.any(self.x[self.fold != fold][:, k] != 0) for k in at])
-        alone = ~there & (np.arange(len(at)) >= FIXED)
-        if not alone.any():
-            return theta
-        rows = self.fold == fold
-        kept = np.where(alone, 0.0, theta)
-        rest = self.y[rows] - self.x[rows][:, at] @ kept
-        kept[alone] = np.linalg.lstsq(self.x[rows][:, at[alone]], rest, rcond=None)[0]
-        return kept
 
     def projected(self, column: int, chosen: Sequence[int]) -> float:
         """Energy of a column that the model cannot imitate, as a share of all of it."""

@@ -63,9 +63,7 @@ def test_a_trend_and_two_odd_runs_are_told_apart(changing: Diagnosis) -> None:
     assert offset.value == pytest.approx(1.5, abs=max(3 * offset.std, 0.05))
     friction = named(changing, "coulomb_friction", "r2").parameters["coulomb"]
     assert friction.value == pytest.approx(-0.8, abs=max(3 * friction.std, 0.02))
-
-
-def test_what_changed_is_told_with_both_values(changing: Diagnosis) -> None:
+    # What changed is told with both values.
     told = changes_in_words(changing)
     (trend,) = [text for text in told if "over" in text]
     start, end = (float(word) for word in trend.split("from ")[1].split(" N·m")[0].split(" to "))
@@ -74,15 +72,7 @@ def test_what_changed_is_told_with_both_values(changing: Diagnosis) -> None:
     assert (start, end) == pytest.approx((4.1, 3.25), abs=0.1)
     assert "Coulomb friction of elbow: 1.2 instead of 2 N·m in r2." in told
     assert len(told) == 2
-
-
-def named(found: Diagnosis, kind: str, *runs: str) -> NamedEffect:
-    (one,) = [e for e in found.effects if (e.effect.kind, e.effect.runs) == (kind, runs)]
-    return one
-
-
-def test_ends_of_the_odd_runs_are_held_out_and_judged(changing: Diagnosis) -> None:
-    """And of no other run: a trend is in all of them."""
+    # Ends of the odd runs are held out and judged. And of no other run: a trend is in all of them.
     found = [(part.runs, [e.kind for e in part.effects]) for part in changing.parts]
     assert found == [(("r2",), ["coulomb_friction"]), (("r3",), ["torque_offset"])]
     for part in changing.parts:
@@ -91,6 +81,11 @@ def test_ends_of_the_odd_runs_are_held_out_and_judged(changing: Diagnosis) -> No
         ("torque_offset", ("shoulder_yaw",), False),
         ("coulomb_friction", ("elbow",), False),
     }
+
+
+def named(found: Diagnosis, kind: str, *runs: str) -> NamedEffect:
+    (one,) = [e for e in found.effects if (e.effect.kind, e.effect.runs) == (kind, runs)]
+    return one
 
 
 def test_a_gain_from_some_run_on_is_that_of_these_runs() -> None:
@@ -108,13 +103,11 @@ def test_a_gain_from_some_run_on_is_that_of_these_runs() -> None:
     assert declared.after.mean_relative_moving < 0.7 * found.after.mean_relative_moving
 
 
-def test_of_a_robot_that_stays_the_same_nothing_changed() -> None:
+def test_a_robot_that_stays_the_same_and_one_with_a_push() -> None:
+    """Nothing changed; or a push, which no other second knows, nor does another recording."""
     found = told(recorded(), KINDS)
     assert (what(found), changes_in_words(found), found.parts) == (ALWAYS, [], ())
-
-
-def test_a_push_of_a_third_of_a_second_is_found() -> None:
-    """No other second knows it, nor does another recording."""
+    # A push of a third of a second is found. No other second knows it, nor does another recording.
     found = told(recorded(planted("contact", (), 25.0, 2, start=2.1, end=2.45)), f"{KINDS},contact")
     pushes = [e.effect.runs for e in found.effects if e.effect.kind == "contact"]
     assert pushes == [("r2",)]

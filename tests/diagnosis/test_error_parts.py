@@ -44,20 +44,16 @@ def test_the_parts_of_a_joint_add_up(who: tuple[int, ...]) -> None:
     assert sum(parts.values()) == pytest.approx(fall, abs=1e-12)
 
 
-def test_a_part_is_the_mean_over_orders() -> None:
+def test_a_part_is_the_mean_over_orders_and_what_is_refined_joins_first() -> None:
     errors = made_up((0, 1), seed=3)
+    first, last = errors.of(()) - errors.of((0,)), errors.of((1,)) - errors.of((0, 1))
     found = error_parts(traced(2), errors)[0]
-    alone, beside = errors.of(()) - errors.of((0,)), errors.of((1,)) - errors.of((0, 1))
     # A hundred draws: as often first as last, within four deviations.
-    assert found == pytest.approx((alone + beside) / 2, abs=float(np.ptp([alone, beside])) * 0.2)
-    assert not np.allclose(found, alone)
-
-
-def test_what_is_refined_joins_first() -> None:
-    errors = made_up((0, 1))
-    found = error_parts(traced(2, {0: (1,)}), errors)
-    assert found[1] == pytest.approx(errors.of(()) - errors.of((1,)))
-    assert found[0] == pytest.approx(errors.of((1,)) - errors.of((0, 1)))
+    assert found == pytest.approx((first + last) / 2, abs=float(np.ptp([first, last])) * 0.2)
+    assert not np.allclose(found, first)
+    refined = error_parts(traced(2, {0: (1,)}), errors)
+    assert refined[1] == pytest.approx(errors.of(()) - errors.of((1,)))
+    assert refined[0] == pytest.approx(last)
     both = error_parts(traced(2, {0: (1,), 1: (0,)}), errors)  # each refines the other
     assert sum(both.values()) == pytest.approx(errors.of(()) - errors.of((0, 1)))
 
@@ -120,10 +116,12 @@ def test_the_smallest_model_is_within_one_standard_error_of_the_best() -> None:
     assert (path.best, path.smallest, path.enough) == (3, 2, True)
     assert path.standard_error == pytest.approx(deviation)
     assert len(path.held_out) == 5
-
-
-def test_runs_that_move_some_joints_only_count_for_those() -> None:
-    """As short moves do; nothing is known where no run says anything."""
+    assert not path_of([[1.0, 1.0], [0.1, 0.2]]).enough, "two runs left out are too few"
+    assert path_of([[1.0], [0.1]]).standard_error == 0.0
+    nothing: Any = None
+    assert error_path(nothing, (), nothing) is None
+    # Runs that move some joints only count for those. As short moves do; nothing is known where no
+    # run says anything.
 
     moves = np.array([[True, False, False], [False, True, False], [False] * 3])
     outcome: Any = SimpleNamespace(
@@ -136,10 +134,3 @@ def test_runs_that_move_some_joints_only_count_for_those() -> None:
     assert not path.enough
     outcome.judge.plain = Plain([[0.0] * 3, [0.0] * 3])
     assert error_path(outcome, (0,), made_up((0,))) is None
-
-
-def test_two_runs_left_out_are_not_enough_to_rely_on() -> None:
-    assert not path_of([[1.0, 1.0], [0.1, 0.2]]).enough
-    assert path_of([[1.0], [0.1]]).standard_error == 0.0
-    nothing: Any = None
-    assert error_path(nothing, (), nothing) is None

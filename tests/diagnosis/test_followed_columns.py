@@ -85,12 +85,6 @@ def followed(found: Diagnosis, joint: str = "shoulder_pitch") -> NamedEffect:
     return one
 
 
-def test_a_column_that_says_the_same_as_time_is_its_alias(told: Diagnosis) -> None:
-    found = followed(told, "elbow")
-    names = {(each.kind, each.covariate) for each in (found.effect, *found.aliases)}
-    assert names >= {("covariate_friction", "battery"), ("friction_change", "")}
-
-
 def test_the_temperature_is_named_and_the_decoy_is_not(told: Diagnosis) -> None:
     found = followed(told)
     assert {each for each in what(told) if each[1] != "elbow"} == {
@@ -103,10 +97,7 @@ def test_the_temperature_is_named_and_the_decoy_is_not(told: Diagnosis) -> None:
     for name, true in (("coulomb_slope", -COULOMB / 40.0), ("viscous_slope", -VISCOUS / 40.0)):
         size = found.parameters[name]
         assert size.value == pytest.approx(true, abs=max(3.0 * size.std, 0.02 * abs(true)))
-
-
-def test_friction_beside_it_is_that_at_the_reference(told: Diagnosis) -> None:
-    found = followed(told)
+    # Friction beside it is that at the reference.
     reference = found.parameters["reference"].value
     assert reference == pytest.approx(np.mean(TEMP.values[:-1]), abs=1.0)
     (dry,) = [
@@ -120,6 +111,10 @@ def test_friction_beside_it_is_that_at_the_reference(told: Diagnosis) -> None:
         and f"N·m per unit of temp; it is {dry:.3g} at {reference:.4g}." in text
         for text in changes_in_words(told)
     )
+    # A column that says the same as time is its alias.
+    found = followed(told, "elbow")
+    names = {(each.kind, each.covariate) for each in (found.effect, *found.aliases)}
+    assert names >= {("covariate_friction", "battery"), ("friction_change", "")}
 
 
 def test_with_the_column_the_held_out_error_is_that_of_noise_and_without_it_more(

@@ -85,11 +85,7 @@ def test_cost_is_residual_energy_and_prices(random_judge: tuple[Judgement, Rows,
         if {2, 4} <= set(chosen):
             price += 1.7 * 4.5 - prices[4]
         assert judge.cost(chosen) == pytest.approx(rows.energy(chosen) + price, rel=1e-8)
-
-
-def test_p_values_are_corrected_for_tests_and_inflation(
-    random_judge: tuple[Judgement, Rows, Rows],
-) -> None:
+    # P values are corrected for tests and inflation.
     judge, rows, _ = random_judge
     schur = judge.white.schur([1])
     for i, dof in ((0, 1), (2, 2), (3, 1)):
@@ -99,6 +95,15 @@ def test_p_values_are_corrected_for_tests_and_inflation(
     assert judge.p_value(3, Gain(30.0, 1, 1.0)) == pytest.approx(4 * chi2.sf(30.0 / 1.7, 1))
     assert judge.p_value(3, Gain(1e-3, 1, 1.0)) == 1.0  # a probability
     assert judge.p_value(3, Gain(0.0, 0, 0.0)) == 1.0
+    # Size is the share of the torque of any joint where it is most.
+    judge, _, rows = random_judge
+    for chosen, added in (([], [0]), ([], [2]), ([1], [3]), ([3], [1, 2])):
+        shares = [
+            (rows.energy(chosen, [j]) - rows.energy([*chosen, *added], [j]))
+            / np.sum(rows.y[rows.joint == j] ** 2)
+            for j in (0, 1)
+        ]
+        assert judge.size(chosen, added, [0, 1]) == pytest.approx(np.sqrt(max(shares)), rel=1e-6)
 
 
 def test_gains_on_blocks_left_out_are_those_of_explicit_fits() -> None:
@@ -120,8 +125,7 @@ def test_gains_on_blocks_left_out_are_those_of_explicit_fits() -> None:
             for noise in noises:
                 rows = rows_of(data, candidates, noise)
                 before, after = (
-                    rows.on_blocks(each, new=False)[joints].sum()
-                    for each in (chosen, [*chosen, *added])
+                    rows.on_blocks(each)[joints].sum() for each in (chosen, [*chosen, *added])
                 )
                 gains.append(1 - np.sqrt(after / before))
             assert judge.left_out_gain(chosen, added) == pytest.approx(max(gains), abs=1e-7)
@@ -136,8 +140,7 @@ def test_an_effect_of_some_runs_is_judged_where_it_is_on_blocks_in_turn(
     judge, *both = random_judge
     for chosen in ([], [0]):
         blocks = [
-            [rows.on_blocks(each, new=False)[0, 2:4].sum() for each in (chosen, [*chosen, 4])]
-            for rows in both
+            [rows.on_blocks(each)[0, 2:4].sum() for each in (chosen, [*chosen, 4])] for rows in both
         ]
         expected = max(1 - np.sqrt(after / before) for before, after in blocks)
         assert judge.left_out_gain(chosen, [4]) == pytest.approx(expected, rel=1e-3)
@@ -156,27 +159,14 @@ def test_a_push_that_no_other_block_of_a_second_knows_is_judged_by_what_it_expla
     judge = judge_of(data, [push], allowed=anything)
     rows = rows_of(data, [push], NoiseModel.white(np.ones(2)))
     assert judge.white.is_brief([0]) == brief
-    before = rows.on_blocks([], new=False)[0, 2:4].sum()
+    before = rows.on_blocks([])[0, 2:4].sum()
     explained = rows.energy([], [0]) - rows.energy([0], [0])
-    after = before - explained if brief else rows.on_blocks([0], new=False)[0, 2:4].sum()
+    after = before - explained if brief else rows.on_blocks([0])[0, 2:4].sum()
     expected = 1 - np.sqrt(after / before)
     assert expected > 0.3
     assert judge.left_out_gain([], [0]) == pytest.approx(expected, rel=1e-3)
     assert judge.verdict([], [0]) is Verdict.ACCEPTED
     assert judge.failing([0]) == []
-
-
-def test_size_is_the_share_of_the_torque_of_any_joint_where_it_is_most(
-    random_judge: tuple[Judgement, Rows, Rows],
-) -> None:
-    judge, _, rows = random_judge
-    for chosen, added in (([], [0]), ([], [2]), ([1], [3]), ([3], [1, 2])):
-        shares = [
-            (rows.energy(chosen, [j]) - rows.energy([*chosen, *added], [j]))
-            / np.sum(rows.y[rows.joint == j] ** 2)
-            for j in (0, 1)
-        ]
-        assert judge.size(chosen, added, [0, 1]) == pytest.approx(np.sqrt(max(shares)), rel=1e-6)
 
 
 def test_what_spoils_the_inertias_of_another_joint_is_not_small() -> None:
@@ -223,19 +213,13 @@ def test_first_order_friction_comes_before_what_refines_it() -> None:
     assert judge.in_order(schur, [], [2, 1])
     assert judge.in_order(judge.white.schur([1]), [1], [2])
     assert not judge.in_order(judge.white.schur([0]), [0], [2])
+    for energy, waits in ((0.9, False), (1.6, True)):  # of its price
+        worth = np.sqrt(energy * chi2.isf(0.01 / 20, 1) / TOTAL)
+        weak = orthogonal({**FRICTION, "coulomb_friction": worth}, tests=20)
+        assert weak.in_order(weak.white.schur([]), [], [2]) != waits
     impossible = orthogonal({**FRICTION, "coulomb_friction": -3.0})
     assert impossible.in_order(impossible.white.schur([]), [], [2])
-
-
-@pytest.mark.parametrize(("energy", "waits"), [(0.9, False), (1.6, True)])
-def test_a_refinement_waits_for_what_is_worth_its_price(energy: float, waits: bool) -> None:
-    price = chi2.isf(0.01 / 20, 1)
-    sizes = {**FRICTION, "coulomb_friction": np.sqrt(energy * price / TOTAL)}
-    judge = orthogonal(sizes, tests=20)
-    assert judge.in_order(judge.white.schur([]), [], [2]) != waits
-
-
-def test_parents_are_those_of_the_same_joint() -> None:
+    # Parents are those of the same joint.
     effects = [
         effect("coulomb_friction", 1),
         effect("viscous_friction", 1),

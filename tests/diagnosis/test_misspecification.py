@@ -11,6 +11,7 @@ from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.misspecification import approximations
 from excite_cli.diagnosis.records import Approximation, LargeRest
 from excite_cli.diagnosis.training import TrainingData
+from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
 from tests.diagnosis.explicit_data import (
     FIXED,
@@ -129,18 +130,6 @@ def test_a_line_through_a_cubic_is_no_spring() -> None:
         assert approximations(traced(data, [spring], [0]), NAMES, rests) == expected
 
 
-def test_structure_counts_on_the_joint_where_an_effect_is_most() -> None:
-    """The effect explains more on b than on a, where another explains most of the torque."""
-    effects = [effect("viscous_friction", 0, 1), effect("armature", 0)]
-    torque = np.array([[3.0, 4.0], [9.0, 0.0]])
-    data, candidates = planted(effects, torque)
-    both = traced(data, candidates, [0, 1])
-    assert approximations(both, NAMES, [left("b", "time", share=0.99)]) == {}
-    large = [left("b", "time", share=20.0)]  # of the residual's energy of one
-    assert approximations(both, NAMES, large) == {0: function_of("time")}
-    assert approximations(both, NAMES, [left("a", "time", share=20.0)]) == {}
-
-
 def test_straight_friction_is_measured_without_what_refines_it() -> None:
     """Beside its refinement, which shares nearly all, little of Coulomb friction would be left."""
     mix = np.array([[1.0, 1.0], [0.0, 0.2]])
@@ -153,6 +142,22 @@ def test_straight_friction_is_measured_without_what_refines_it() -> None:
         data, candidates = planted([effect("coulomb_friction"), effect(kind)], torque, mix)
         found = approximations(traced(data, candidates, [0, 1]), NAMES, rests)
         assert set(found) == expected
+    # Structure counts on the joint where an effect is most. The effect explains more on b than on
+    # a, where another explains most of the torque.
+    effects = [effect("viscous_friction", 0, 1), effect("armature", 0)]
+    torque = np.array([[3.0, 4.0], [9.0, 0.0]])
+    data, candidates = planted(effects, torque)
+    both = traced(data, candidates, [0, 1])
+    assert approximations(both, NAMES, [left("b", "time", share=0.99)]) == {}
+    large = [left("b", "time", share=20.0)]  # of the residual's energy of one
+    assert approximations(both, NAMES, large) == {0: function_of("time")}
+    assert approximations(both, NAMES, [left("a", "time", share=20.0)]) == {}
+    # What cannot be on another joint is no matter.
+    kinds = (("viscous_friction", 0), ("stribeck_friction", 1), ("viscous_friction", 1))
+    effects = [effect(kind, joint) for kind, joint in kinds]
+    data, candidates = planted(effects, np.array([[1.0, 0.0], [0.0, 9.0], [0.0, 2.0]]))
+    found = approximations(traced(data, candidates, [0, 2], all_but(1)), NAMES, [])
+    assert set(found) == {2}
 
 
 @pytest.mark.parametrize("rival", [2.9, 3.1])
@@ -168,47 +173,6 @@ def test_what_cannot_be_and_explains_more_makes_a_name_doubtful(rival: float) ->
     assert approximations(traced(data, candidates, [0], all_but(2)), NAMES, []) == {}
     # Once the other is in, it stands for nothing else.
     assert approximations(traced(data, candidates, [0, 1], all_but(1)), NAMES, []) == {}
-
-
-@pytest.mark.parametrize(
-    ("kind", "doubted"), [("stribeck_friction", True), ("elasticity", True), ("armature", False)]
-)
-def test_what_cannot_be_and_depends_on_something_else_is_no_matter(
-    kind: str, doubted: bool
-) -> None:
-    """An inertia says nothing of a function of speed; a function of several quantities might."""
-    effects = [effect("viscous_friction"), effect(kind)]
-    data, candidates = planted(effects, np.array([[1.0, 0.0], [9.0, 0.0]]))
-    found = approximations(traced(data, candidates, [0], all_but(1)), NAMES, [])
-    assert set(found) == ({0} if doubted else set())
-
-
-def test_what_cannot_be_on_another_joint_is_no_matter() -> None:
-    kinds = (("viscous_friction", 0), ("stribeck_friction", 1), ("viscous_friction", 1))
-    effects = [effect(kind, joint) for kind, joint in kinds]
-    data, candidates = planted(effects, np.array([[1.0, 0.0], [0.0, 9.0], [0.0, 2.0]]))
-    found = approximations(traced(data, candidates, [0, 2], all_but(1)), NAMES, [])
-    assert set(found) == {2}
-
-
-def test_another_shape_of_a_chosen_effect_is_no_rival() -> None:
-    effects = [effect("stribeck_friction", stribeck_speed=speed) for speed in (0.1, 0.2)]
-    data, candidates = planted(effects, np.array([[1.0, 0.0], [9.0, 0.0]]))
-    assert approximations(traced(data, candidates, [0], all_but(1)), NAMES, []) == {}
-
-
-def test_structure_is_told_before_a_rival() -> None:
-    effects = [effect("viscous_friction"), effect("armature")]
-    data, candidates = planted(effects, np.array([[3.0, 0.0], [9.0, 0.0]]))
-    rests = [left("a", "v[a]", "time", share=0.5)]
-    found = approximations(traced(data, candidates, [0], all_but(1)), NAMES, rests)
-    assert found == {0: function_of("v[a]", "time")}
-
-
-def test_without_effects_there_is_nothing_to_doubt() -> None:
-    data, candidates = planted([effect("viscous_friction")], np.array([[3.0, 0.0]]))
-    rests = [left("a", "v[a]", share=0.9)]
-    assert approximations(traced(data, candidates, [], all_but(0)), NAMES, rests) == {}
 
 
 @pytest.mark.parametrize(
@@ -308,3 +272,28 @@ def test_a_change_must_explain_more_than_is_left_in_its_runs(
     data, candidates = planted([change], np.array([[size, 0.0]]))
     found = approximations(traced(data, candidates, [0]), NAMES, [])
     assert found == ({0: Approximation()} if doubted else {})
+
+
+SHAPES = [effect("stribeck_friction", stribeck_speed=speed) for speed in (0.1, 0.2)]
+
+
+@pytest.mark.parametrize(
+    ("effects", "chosen", "doubted"),
+    [
+        ([effect("viscous_friction"), effect("stribeck_friction")], [0], {0}),
+        ([effect("viscous_friction"), effect("elasticity")], [0], {0}),  # of several quantities
+        ([effect("viscous_friction"), effect("armature")], [0], set()),  # not of speed
+        (SHAPES, [0], set()),  # another shape of what is chosen
+        ([effect("viscous_friction"), effect("stribeck_friction")], [], set()),
+    ],
+)
+def test_whether_what_cannot_be_makes_a_name_doubtful(
+    effects: list[Effect], chosen: list[int], doubted: set[int]
+) -> None:
+    """It explains much more than what is chosen."""
+    data, candidates = planted(effects, np.array([[1.0, 0.0], [9.0, 0.0]]))
+    there = traced(data, candidates, chosen, all_but(1))
+    assert set(approximations(there, NAMES, [])) == doubted
+    rests = [left("a", "v[a]", "time", share=0.95)]
+    found = approximations(there, NAMES, rests)
+    assert found == (dict.fromkeys(chosen, function_of("v[a]", "time"))), "told before a rival"

@@ -90,7 +90,7 @@ def test_friction_that_changes_over_a_turn_is_named_beside_its_mean(power: float
     assert there.value == pytest.approx(3.0, abs=0.1)
 
 
-def test_a_ripple_of_one_period_is_named_with_its_size() -> None:
+def test_a_ripple_is_named_with_its_size_and_a_spring_that_hardens_is_none() -> None:
     periods = 2 * np.pi * 1.2 / 1.5  # the elbow travels about 1.5 rad in these runs
     found = diagnosed(planted("ripple", ELBOW, 2.0, periods=periods, phase=0.7))
     assert names(found) == [("ripple", "elbow")]
@@ -98,9 +98,7 @@ def test_a_ripple_of_one_period_is_named_with_its_size() -> None:
     assert ripple.effect.shape["periods"] == pytest.approx(periods, rel=0.02)
     assert ripple.parameters["amplitude"].value == pytest.approx(2.0, rel=0.05)
     assert found.after.mean_relative_moving < 0.3 * found.before.mean_relative_moving
-
-
-def test_a_spring_that_hardens_is_no_ripple() -> None:
+    # A spring that hardens is no ripple.
     found = diagnosed(plant(HardeningSpring, (ELBOW,), 6.0, {"rest": 0.3}))
     assert not names(found)
     assert found.effects or found.unexplained

@@ -55,9 +55,7 @@ def test_partial_residuals_follow_the_laws_that_are_reported(found: Diagnosis) -
             assert named.parameters["viscous"].value == pytest.approx(VISCOUS, rel=0.05)
             assert own == pytest.approx(named.parameters["viscous"].value * x, rel=1e-3, abs=1e-3)
             assert (trace.quantity, trace.unit) == ("speed", "rad/s")
-
-
-def test_the_parts_of_friction_add_up(found: Diagnosis) -> None:
+    # The parts of friction add up.
     assert found.traces is not None
     parts = [t for t in found.traces.effects if t.quantity == "speed" and t.rows == t.joints]
     parts = [t for t in parts if t.rows == (found.joint_names[2],)]

@@ -66,12 +66,8 @@ def test_every_link_before_and_after(changed: tuple[Identification, Array]) -> N
             assert abs(change.after - true) < 3 * change.std
         assert link.marks == ()
     assert not [f for f in found.findings if f.kind == "implausible_link"]
-
-
-def test_what_the_data_determine_is_told_from_what_they_do_not(
-    changed: tuple[Identification, Array],
-) -> None:
-    """The column turns about the vertical: its weight shows in no torque; the tool's does."""
+    # What the data determine is told from what they do not. The column turns about the vertical:
+    # its weight shows in no torque; the tool's does.
     links = {link.link: link for link in changed[0].fit.links}
     column, tool = links["column"], links["tool"]
     assert column.mass.left > 0.99
@@ -121,9 +117,7 @@ def test_a_tool_that_is_not_in_the_urdf_is_marked(with_tool: Identification) -> 
     assert (finding.severity, finding.joints) == ("warning", (tool.joint,))
     for words in ("tool: mass 2.", "robot.payload", "excite diagnose", "identification.inertias"):
         assert words in finding.text
-
-
-def test_the_table_shows_what_changed_and_counts_the_rest(with_tool: Identification) -> None:
+    # The table shows what changed and counts the rest.
     links = with_tool.fit.links
     table, counted = link_parts(links)
     assert not isinstance(table, str)

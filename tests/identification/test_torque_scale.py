@@ -150,6 +150,15 @@ def test_gains_are_uncertain_together_and_each() -> None:
     own: tuple[Effect, ...] = (kind_named("torque_gain")((2,)),)
     assert len(knowledge_of(IdentificationSpec(gain_std=0.1), own, ROBOT, BASE).effects) == ROBOT.n
     assert knowledge_of(IdentificationSpec(), own, ROBOT, BASE).rows.shape == (0, BASE.rank + 1)
+    # What is assumed is told.
+    current, link = MeasurementSpec(torque="current"), MeasurementSpec()
+    (note,) = assumed_scale(current, IdentificationSpec())
+    assert "torque_constant and gear_ratio" in note.text
+    assert "known_payload" in note.text
+    assert note.severity == "note"
+    assert not assumed_scale(link, IdentificationSpec())
+    assert not assumed_scale(current, IdentificationSpec(gain_std=0.05))
+    assert not assumed_scale(current, IdentificationSpec(total_mass=TotalMassSpec(mass=30.0)))
 
 
 def test_what_is_known_is_of_the_parameters_of_their_effects() -> None:
@@ -171,17 +180,6 @@ def test_what_is_known_is_of_the_parameters_of_their_effects() -> None:
     same = weighed(spec, (body,), ROBOT, BASE)  # declared already
     assert same.effects == (body,)
     assert same.rows[:, BASE.rank :] == pytest.approx(found.rows[:, first:])
-
-
-def test_what_is_assumed_is_told() -> None:
-    current, link = MeasurementSpec(torque="current"), MeasurementSpec()
-    (note,) = assumed_scale(current, IdentificationSpec())
-    assert "torque_constant and gear_ratio" in note.text
-    assert "known_payload" in note.text
-    assert note.severity == "note"
-    assert not assumed_scale(link, IdentificationSpec())
-    assert not assumed_scale(current, IdentificationSpec(gain_std=0.05))
-    assert not assumed_scale(current, IdentificationSpec(total_mass=TotalMassSpec(mass=30.0)))
 
 
 def test_the_run_with_the_known_payload_is_fitted_not_held_out(data: Dataset) -> None:
