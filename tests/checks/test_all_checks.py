@@ -24,8 +24,6 @@ LOGS = Path(__file__).resolve().parents[2] / "data"
 URDFS = {"kr300": "kr300.urdf", "tx40": "tx40_mdh_modified.urdf", "ur10_cb": "ur10.urdf"}
 SPEC: Spec = load_spec(Path(__file__).resolve().parents[2] / "configs" / "ur10.yaml")
 SIZES = [10.0, 15.0, 8.0, 3.0, 2.0, 1.0]  # N·m of dry friction
-
-
 ROBOT = arm()
 
 

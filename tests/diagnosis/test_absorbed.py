@@ -53,6 +53,18 @@ def absorbed(
     return {(each.kind, each.joints[0]): each for each in records}
 
 
+def in_proportion(factor: float) -> Effect:
+    """To the speed of the second joint."""
+
+    class Proportional(Armature):
+        kind = "proportional"
+
+        def columns(self, signals):  # type: ignore[no-untyped-def]
+            return factor * signals.v[:, list(self.joints), None]
+
+    return Proportional((1,))
+
+
 def test_what_absorbs_an_effect() -> None:
     """Izz of link k has the column I_a a_k while what comes before turns about other axes.
 
@@ -67,35 +79,19 @@ def test_what_absorbs_an_effect() -> None:
         assert each.left < ABSORBED
     # What a found effect absorbs is named after it. A second effect of the same form is absorbed by
     # the one in the model, not by an inertia.
-
-    class Same(Armature):
-        kind = "same"
-        title = "the same as viscous friction"
-
-        def columns(self, signals):  # type: ignore[no-untyped-def]
-            return 3.0 * signals.v[:, list(self.joints), None]
-
-    viscous, same = ViscousFriction((1,)), Same((1,))
+    viscous, same = ViscousFriction((1,)), in_proportion(3.0)
     assert absorbed([viscous, same]) == {}
     found = absorbed([viscous, same], chosen=(0,))
-    assert found["same", ROBOT.joint_names[1]].by == (f"viscous[{ROBOT.joint_names[1]}]",)
+    assert found["proportional", ROBOT.joint_names[1]].by == (f"viscous[{ROBOT.joint_names[1]}]",)
 
 
 def test_what_is_not_absorbed() -> None:
     effects: list[Effect] = [ViscousFriction((0,)), CoulombFriction((1,)), TorqueOffset((2,))]
     assert absorbed(effects) == {}
 
-    # What does not show at all is not absorbed.
-    class Nothing(Armature):
-        kind = "nothing"
-        title = "nothing"
-
-        def columns(self, signals):  # type: ignore[no-untyped-def]
-            return 0.0 * signals.v[:, list(self.joints), None]
-
-    assert absorbed([Nothing((1,))]) == {}
-    # Refinements runs and chosen places are left out.
-    effects: list[Effect] = [
+    assert absorbed([in_proportion(0.0)]) == {}, "what does not show at all is not absorbed"
+    # Refinements, runs and chosen places are left out.
+    effects = [
         Armature((0,), {}, ("r1",)),
         NonlinearViscousFriction((0,), {"power": 2.0}),
         Spring((0,)),

@@ -21,8 +21,6 @@ from tests.diagnosis.synthetic_diagnosis import make_diagnosis
 
 SPRING = {"stiffness": Value(6912.0, 30.0, "N·m/rad"), "preload": Value(10.0, 1.0, "N·m")}
 RUBS = {"coulomb": Value(2.0, 0.1, "N·m")}
-
-
 PLAIN = make_diagnosis()
 
 

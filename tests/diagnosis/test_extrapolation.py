@@ -22,8 +22,6 @@ from tests.effects.motions import signals_at
 SAMPLES, STEP = 1000, 0.02
 SLOW, FAST = 0.02, 2.0  # rad/s
 TORQUE = 3.0  # N·m
-
-
 ROBOT = build_robot(RobotSpec(urdf="example-robot-data:ur5"))
 
 

@@ -13,28 +13,24 @@ from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
 
 ROBOT = random_robot(4, joints=3, branches=False, prismatic=False)
-
-
-@pytest.fixture(scope="module")
-def signals() -> Signals:
-    found = signals_of(ROBOT, 400)
-    return replace(found, torque=1.5 * found.load)
+MOVED = signals_of(ROBOT, 400)
+SIGNALS = replace(MOVED, torque=1.5 * MOVED.load)
 
 
 @pytest.mark.parametrize("kind", sorted(catalogue()))
-def test_every_kind_can_be_drawn(kind: str, signals: Signals) -> None:
+def test_every_kind_can_be_drawn(kind: str) -> None:
     effect_kind = kind_named(kind)
     shape, _ = effect_kind.planted(1.0, {})
     whole = effect_kind.scope == "base"
     place = tuple(range(ROBOT.n)) if whole else effect_kind.places(ROBOT)[0]
-    found = effect_kind(place, shape).abscissa(signals)
+    found = effect_kind(place, shape).abscissa(SIGNALS)
     if found is None:  # drawn over the torque that it predicts
         assert kind in {
             "backlash", "base_tilt", "cable_force", "elasticity", "encoder_offset", "payload",
             "torque_delay", "wrench_gain",
         }  # fmt: skip
         return
-    assert found.values.shape == signals.t.shape
+    assert found.values.shape == SIGNALS.t.shape
     assert np.isfinite(found.values).all()
     assert found.name
     assert found.unit
@@ -45,28 +41,28 @@ def test_every_kind_can_be_drawn(kind: str, signals: Signals) -> None:
     [("coulomb_friction", "v", "rad/s"), ("spring", "q", "rad"), ("armature", "a", "rad/s²"),
      ("torque_gain", "load", "N·m")],
 )  # fmt: skip
-def test_one_quantity_of_its_joint(kind: str, series: str, unit: str, signals: Signals) -> None:
-    found = kind_named(kind)((1,)).abscissa(signals)
+def test_one_quantity_of_its_joint(kind: str, series: str, unit: str) -> None:
+    found = kind_named(kind)((1,)).abscissa(SIGNALS)
     assert found is not None
-    assert np.array_equal(found.values, getattr(signals, series)[:, 1])
+    assert np.array_equal(found.values, getattr(SIGNALS, series)[:, 1])
     assert found.unit == unit
 
 
-def test_ripple_repeats_within_its_period(signals: Signals) -> None:
+def test_ripple_repeats_within_its_period() -> None:
     effect = kind_named("ripple")((0,), {"periods": 12.0})
-    found = effect.abscissa(signals)
+    found = effect.abscissa(SIGNALS)
     assert found is not None
     assert found.period == pytest.approx(2 * np.pi / 12.0)
     angle = np.mod(found.values, found.period) * 12.0
-    columns = effect.columns(signals)[:, 0]
+    columns = effect.columns(SIGNALS)[:, 0]
     assert columns == pytest.approx(np.stack([np.cos(angle), np.sin(angle)], axis=1), abs=1e-9)
     # Friction with load is a line over its abscissa.
     effect = kind_named("load_dependent_friction")((2,))
-    found = effect.abscissa(signals)
+    found = effect.abscissa(SIGNALS)
     assert found is not None
-    assert np.array_equal(found.values, effect.columns(signals)[:, 0, 0])
+    assert np.array_equal(found.values, effect.columns(SIGNALS)[:, 0, 0])
     # Effects of users need none.
-    assert Own((0,)).abscissa(signals) is None
+    assert Own((0,)).abscissa(SIGNALS) is None
 
 
 class Own(Effect):

@@ -12,8 +12,6 @@ from tests.effects.motions import signals_at
 from tests.robot.random_robots import random_robot
 
 D = 0.05
-
-
 ROBOT = random_robot(4, joints=1, branches=False, prismatic=False)
 
 

@@ -12,8 +12,6 @@ from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
 
 CHANGE = np.array([-0.9, 0.4])
-
-
 ROBOT = random_robot(9, joints=3, branches=False)
 
 

@@ -19,8 +19,6 @@ from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
 
 ROBOT = random_robot(5, joints=3, branches=False, prismatic=False)
-
-
 SIGNALS = signals_of(ROBOT, 400)
 
 

@@ -10,28 +10,22 @@ from excite_cli.diagnosis.candidates import shapes_around
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.effects.covariate_friction import CovariateFriction
 from excite_cli.effects.covariate_offset import CovariateOffset
-from excite_cli.effects.signals import Signals
 from excite_cli.errors import ConfigError
 from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
 
 AT_20 = {"reference": 20.0}
-
-
 ROBOT = random_robot(5, joints=3, branches=False, prismatic=False)
+MOVED = signals_of(ROBOT, 300)
+CLOCK = MOVED.t / MOVED.t[-1]
+# Twenty degrees at first, thirty at the end.
+SIGNALS = replace(MOVED, covariates={"temp": 20.0 + 10.0 * CLOCK, "fan": MOVED.t})
 
 
-@pytest.fixture(scope="module")
-def signals() -> Signals:
-    """Twenty degrees at first, thirty at the end."""
-    found = signals_of(ROBOT, 300)
-    return replace(found, covariates={"temp": 20.0 + found.t * 10.0 / found.t[-1], "fan": found.t})
-
-
-def test_friction_changes_with_the_column_and_is_nothing_at_the_reference(signals: Signals) -> None:
+def test_friction_changes_with_the_column_and_is_nothing_at_the_reference() -> None:
     effect = CovariateFriction((1,), AT_20, (), "temp")
-    tau = effect.torque(signals, np.array([-0.2, 0.05]))[:, 1]
-    v, warmer = signals.v[:, 1], signals.covariates["temp"] - 20.0
+    tau = effect.torque(SIGNALS, np.array([-0.2, 0.05]))[:, 1]
+    v, warmer = SIGNALS.v[:, 1], SIGNALS.covariates["temp"] - 20.0
     fast = np.abs(v) > 0.01
     assert tau[fast] == pytest.approx((warmer * (-0.2 * np.sign(v) + 0.05 * v))[fast])
     assert tau[0] == 0.0
@@ -39,22 +33,22 @@ def test_friction_changes_with_the_column_and_is_nothing_at_the_reference(signal
     # v, with δ for this κ and no other.
     thins = 4.0 * np.expm1(-0.07 * warmer)
     effect = CovariateFriction((1,), {**AT_20, "curvature": 0.07}, (), "temp")
-    tau = effect.torque(signals, np.array([-4.0 * 0.07, 0.0]))[:, 1]
+    tau = effect.torque(SIGNALS, np.array([-4.0 * 0.07, 0.0]))[:, 1]
     assert tau[fast] == pytest.approx((thins * np.sign(v))[fast])
     nearly = replace(effect, shape={**AT_20, "curvature": 1e-8})
     straight = CovariateFriction((1,), AT_20, (), "temp")
-    assert nearly.columns(signals) == pytest.approx(straight.columns(signals), rel=1e-6, abs=1e-9)
+    assert nearly.columns(SIGNALS) == pytest.approx(straight.columns(SIGNALS), rel=1e-6, abs=1e-9)
     # An offset changes with the column however the joint moves.
-    tau = CovariateOffset((2,), AT_20, (), "temp").torque(signals, np.array([0.3]))
-    assert tau[:, 2] == pytest.approx(0.3 * (signals.covariates["temp"] - 20.0))
+    tau = CovariateOffset((2,), AT_20, (), "temp").torque(SIGNALS, np.array([0.3]))
+    assert tau[:, 2] == pytest.approx(0.3 * (SIGNALS.covariates["temp"] - 20.0))
     assert not tau[:, :2].any()
-    still = replace(signals, covariates={"temp": np.full(len(signals.t), 21.7)})
+    still = replace(SIGNALS, covariates={"temp": np.full(len(SIGNALS.t), 21.7)})
     assert CovariateOffset.grid(ROBOT, (0,), [still, still]) == []
-    assert signals.every(2).covariates["temp"] == pytest.approx(signals.covariates["temp"][::2])
+    assert SIGNALS.every(2).covariates["temp"] == pytest.approx(SIGNALS.covariates["temp"][::2])
 
 
-def test_shapes_that_are_looked_for(signals: Signals) -> None:
-    own = [signals.with_covariate("temp")]  # ten degrees
+def test_shapes_that_are_looked_for() -> None:
+    own = [SIGNALS.with_covariate("temp")]  # ten degrees
     straight, *curves = CovariateFriction.grid(ROBOT, (0,), own)
     assert straight["curvature"] == 0.0
     assert [each["curvature"] for each in curves] == pytest.approx([0.07, 0.15, -0.07])
@@ -64,7 +58,7 @@ def test_shapes_that_are_looked_for(signals: Signals) -> None:
     bent = CovariateFriction((0,), {**straight, "curvature": 0.35}, (), "temp")
     assert max(shape["curvature"] for shape in shapes_around(bent, own)) <= 0.4
     # The reference is the mean of what was seen.
-    own = signals.with_covariate("temp")
+    own = SIGNALS.with_covariate("temp")
     warm = replace(own, covariates={"temp": np.full(len(own.t), 40.0)})
     shape, *_ = CovariateFriction.grid(ROBOT, (0,), [own, warm])
     assert shape["reference"] == pytest.approx(32.5)

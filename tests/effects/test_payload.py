@@ -19,8 +19,6 @@ from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
 
 _, SPHERE = Payload.planted(2.0, {"cx": 0.03, "cy": -0.02, "cz": 0.1})
-
-
 BRANCHED = next(r for r in map(random_robot, range(40)) if len(leaves(r)) > 1)
 
 

@@ -18,8 +18,6 @@ from tests.robot.random_robots import random_robot
 WITH_SLOPE = {"covariate_friction", "covariate_offset", "friction_change", "wrench_gain"}
 EXCITABLE = [name for name, kind in catalogue().items() if kind.excitable]
 SAMPLES, STEP = 5, 0.1
-
-
 ROBOTS = [
     random_robot(3, joints=3, branches=False, prismatic=False),
     random_robot(8, joints=3, floating=True, rows=("joints",)),

@@ -9,8 +9,6 @@ from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
 
 ROBOT = random_robot(5, joints=3, branches=False, prismatic=False)
-
-
 RUNS = [signals_of(ROBOT, 4000, step=0.004, seed=seed) for seed in (0, 1)]
 
 

@@ -14,8 +14,6 @@ from tests.robot.random_robots import random_robot
 KINDS = catalogue()
 NAMES = sorted(KINDS)
 PACKAGE = Path(excite_cli.__file__).parent
-
-
 ROBOT = random_robot(9, joints=3, branches=False)
 
 

@@ -29,9 +29,8 @@ from tests.identification.synthetic import measured, regression_of
 from tests.robot.random_robots import random_robot
 
 ROBOT = random_robot(4, joints=4)
-
-
 BASE = find_base_parameters(ROBOT)
+CAD = standard_parameters(ROBOT)
 
 
 def factor_of(phi: Array, noise: float, friction: Array, seed: int = 1) -> Array:
@@ -56,7 +55,7 @@ def solved(factor: Array, cad: Array, spread: float = 1.0) -> ConsistentParamete
 def test_planted_consistent_parameters_are_recovered() -> None:
     phi = true_inertias(ROBOT, 0.2, seed=3)
     friction = np.array([1.0, 0.5, 2.0, 0.1])
-    found = solved(ROBOT, BASE, factor_of(phi, 0.0, friction), standard_parameters(ROBOT))
+    found = solved(factor_of(phi, 0.0, friction), CAD)
     assert found.solved
     expected = BASE.mapping @ phi
     assert BASE.mapping @ found.phi == pytest.approx(expected, abs=1e-3 * np.abs(expected).max())
@@ -70,7 +69,7 @@ def test_whatever_the_noise_bodies_are_real(noise: float, seed: int) -> None:
     phi = true_inertias(ROBOT, 0.2, seed=3)
     friction = np.array([0.1, 0.0, 0.2, 0.0])
     factor = factor_of(phi, noise, friction, seed)
-    found = solved(factor, standard_parameters(ROBOT))
+    found = solved(factor, CAD)
     assert found.solved
     eigenvalues = np.linalg.eigvalsh(pseudo_inertias(found.phi))
     assert eigenvalues.min() > 0
@@ -78,15 +77,14 @@ def test_whatever_the_noise_bodies_are_real(noise: float, seed: int) -> None:
     assert found.cost >= -1e-6
     if noise == 30.0:  # this much does break the fit without constraints
         free = np.linalg.lstsq(factor[:-1, :-1], factor[:-1, -1], rcond=None)[0]
-        cad = standard_parameters(ROBOT)
-        completed = inertial_prior(ROBOT, cad, 1.0).completed(BASE, free[: BASE.rank])
-        assert smallest_eigenvalues(completed, body_lengths(ROBOT, cad)).min() < 0
+        completed = inertial_prior(ROBOT, CAD, 1.0).completed(BASE, free[: BASE.rank])
+        assert smallest_eigenvalues(completed, body_lengths(ROBOT, CAD)).min() < 0
 
 
 def test_inertias_of_the_urdf_that_are_impossible_do_no_harm() -> None:
     """A point mass away from its joint, and a body without any mass."""
     phi = true_inertias(ROBOT, 0.2, seed=3)
-    cad = standard_parameters(ROBOT).copy()
+    cad = CAD.copy()
     cad[-6:] = 0.0
     cad[10:20] = 0.0
     assert smallest_eigenvalues(cad, np.ones(ROBOT.n_bodies)).min() < 0
@@ -154,33 +152,30 @@ def test_the_pseudo_inertia_of_point_masses() -> None:
 
 def both(factor: Array) -> tuple[ConsistentParameters, ConsistentParameters]:
     """With the prior as it is, and as near to it as the data let."""
-    cad = standard_parameters(ROBOT)
-    given = (factor, BASE, inertial_prior(ROBOT, cad, 1.0), body_lengths(ROBOT, cad))
+    given = (factor, BASE, inertial_prior(ROBOT, CAD, 1.0), body_lengths(ROBOT, CAD))
     signs = np.ones(ROBOT.n, bool)
     return consistent_parameters(*given, signs), consistent_near_prior(*given, signs)
 
 
 def off(phi: Array, other: Array) -> float:
-    std = inertial_prior(ROBOT, standard_parameters(ROBOT), 1.0).std
+    std = inertial_prior(ROBOT, CAD, 1.0).std
     return float(np.sqrt(np.mean(np.square((phi - other) / std))))
 
 
 def test_noise_does_not_move_a_robot_that_is_as_its_urdf_says() -> None:
-    cad = standard_parameters(ROBOT)
-    wide, near = both(factor_of(cad, 10.0, np.ones(4)))
+    wide, near = both(factor_of(CAD, 10.0, np.ones(4)))
     assert near.spread < 0.2
-    assert off(near.phi, cad) < 0.4 * off(wide.phi, cad)
+    assert off(near.phi, CAD) < 0.4 * off(wide.phi, CAD)
     assert near.cost <= wide.cost + CLEARLY_WORSE
 
 
 def test_what_the_data_show_is_followed() -> None:
     """Every base parameter is as far from the truth as the noise makes it, not the URDF."""
     truth = true_inertias(ROBOT, 0.4, seed=3)
-    cad = standard_parameters(ROBOT)
     factor = factor_of(truth, 0.1, np.ones(4))
     wide, near = both(factor)
     assert near.cost <= wide.cost + CLEARLY_WORSE
-    moved = np.abs(BASE.mapping @ (truth - cad)).max()
+    moved = np.abs(BASE.mapping @ (truth - CAD)).max()
     assert np.abs(BASE.mapping @ (near.phi - truth)).max() < 0.2 * moved
     assert off(near.phi, truth) < 1.1 * off(wide.phi, truth)
 
@@ -206,8 +201,7 @@ def test_a_link_of_the_kuka_that_the_data_do_not_determine_stays_near_its_urdf(
 
 
 def test_the_users_own_uncertainty_is_left_alone() -> None:
-    cad = standard_parameters(ROBOT)
-    data = measured(ROBOT, cad, noise=1.0, seconds=4.0)
+    data = measured(ROBOT, CAD, noise=1.0, seconds=4.0)
     regression = regression_of(ROBOT, data)
     spreads = []
     for inertias in ("free", "cad"):

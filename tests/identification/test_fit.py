@@ -22,14 +22,8 @@ from tests.robot.random_robots import random_robot
 FRICTION = (EffectSpec(kind="viscous_friction"), EffectSpec(kind="coulomb_friction"))
 FREE = IdentificationSpec(consistent=False)
 KEPT = IdentificationSpec(consistent=False, inertias="cad", uncertainty=0.1)
-
-
 ROBOT = random_robot(7, joints=4, branches=False, prismatic=False)
-
-
 TRUTH = true_inertias(ROBOT, 0.2, seed=5)
-
-
 RUBBING = declared_effects(FRICTION, ROBOT)
 
 

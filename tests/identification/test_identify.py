@@ -20,14 +20,8 @@ SPEC = parse_spec(
     "{robot: {urdf: x}, effects: [{kind: viscous_friction}, {kind: coulomb_friction}]}"
 )
 VALUES = np.array([1.0, 2.0, 0.5, 3.0, 1.0, 2.0])
-
-
 ROBOT = random_robot(3, joints=3, prismatic=False)
-
-
 TRUTH = true_inertias(ROBOT, 0.2, seed=1)
-
-
 EFFECTS = declared_effects(SPEC.effects, ROBOT)
 
 

@@ -15,8 +15,6 @@ from excite_cli.robot.model import Array, build_robot
 from tests.cli.program import SMOKE
 
 UPPER_ARM = 1  # a box of 80 x 80 x 360 mm, of 3 kg
-
-
 ROBOT = build_robot(RobotSpec(urdf=str(SMOKE.parents[1] / "data" / "smoke_arm.urdf")))
 
 

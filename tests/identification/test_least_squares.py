@@ -55,10 +55,11 @@ def test_a_prior_decides_where_data_are_silent_and_nowhere_else() -> None:
     rows = random_rows(1, np.array([0.1, 0.1]))
     columns = np.concatenate([rows.columns, np.zeros((*rows.tau.shape, 1))], axis=2)
     prior = np.eye(5) / 2.0, np.array([0.0, 0.0, 0.0, 0.0, 7.0]) / 2.0
-    fit = fit_rows([Rows(columns, rows.tau, rows.usable)], "wls", prior)
-    assert fit.x[4] == pytest.approx(7.0)
-    assert np.sqrt(fit.covariance[4, 4]) == pytest.approx(2.0)
-    assert fit.x[:2] == pytest.approx(X[:2], abs=0.05)
+    for method in ("ols", "wls", "irls"):
+        fit = fit_rows([Rows(columns, rows.tau, rows.usable)], method, prior)
+        assert fit.x[4] == pytest.approx(7.0)
+        assert np.sqrt(fit.covariance[4, 4]) == pytest.approx(2.0)
+        assert fit.x[:2] == pytest.approx(X[:2], abs=0.05)
 
 
 def test_exact_data_do_not_divide_by_zero() -> None:

@@ -10,8 +10,6 @@ from excite_cli.identification.prior import inertial_prior, prior_of
 from tests.robot.random_robots import random_robot
 
 ROBOT = random_robot(2, joints=4)
-
-
 BASE = find_base_parameters(ROBOT)
 
 
