@@ -110,6 +110,9 @@ def cheapest(data: TrainingData, candidates: Sequence[Candidate]) -> set[int]:
 
 # No one refines another; two shapes of the last kind share a place.
 LOCAL_AND_COHERENT = [
+    VISCOUS,
+    COULOMB,
+    OFFSET,
     effect("armature", 1),
     effect("spring", 1),
     effect("viscous_friction", 0, 1),
@@ -117,6 +120,9 @@ LOCAL_AND_COHERENT = [
     effect("ripple", 0, periods=2.0),
 ]
 FRICTION = [
+    VISCOUS,
+    COULOMB,
+    OFFSET,
     effect("load_dependent_friction"),
     effect("asymmetric_friction"),
     effect("nonlinear_viscous_friction", power=2.0),

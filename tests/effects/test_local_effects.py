@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 
-from excite_cli.effects.asymmetric_friction import AsymmetricFriction
 from excite_cli.effects.base import Signals
 from excite_cli.effects.cable_force import CableForce
+from excite_cli.effects.catalogue import kind_named
 from excite_cli.effects.coupled_friction import CoupledFriction
-from excite_cli.effects.friction_drift import FrictionDrift
-from excite_cli.effects.load_dependent_friction import LoadDependentFriction
 from excite_cli.effects.nonlinear_viscous_friction import NonlinearViscousFriction
 from excite_cli.effects.spring import Spring
 from excite_cli.effects.stribeck_friction import StribeckFriction
@@ -22,20 +20,29 @@ ROBOT = random_robot(5, joints=3, branches=False, prismatic=False)
 SIGNALS = signals_of(ROBOT, 400)
 
 
-def test_friction_that_depends_on_load_or_time() -> None:
-    tau = LoadDependentFriction((1,)).torque(SIGNALS, np.array([0.07]))
-    fast = np.abs(SIGNALS.v[:, 1]) > 0.01
-    power = (tau * SIGNALS.v)[fast].sum(axis=1)
-    assert power == pytest.approx(0.07 * np.abs(SIGNALS.load * SIGNALS.v)[fast, 1])
-    # Friction drift is friction that grows from zero.
-    tau = FrictionDrift((0,)).torque(SIGNALS, np.array([-0.2, 0.3]))[:, 0]
-    v, fast = SIGNALS.v[:, 0], np.abs(SIGNALS.v[:, 0]) > 0.01
-    expected = SIGNALS.t * (-0.2 * np.sign(v) + 0.3 * v)
-    assert tau[fast] == pytest.approx(expected[fast])
-    # Asymmetric friction differs between directions.
-    tau = AsymmetricFriction((1,)).torque(SIGNALS, np.array([5.0, 2.0]))[:, 1]
-    fast = np.abs(SIGNALS.v[:, 1]) > 0.01
-    assert tau[fast] == pytest.approx(np.where(SIGNALS.v[fast, 1] > 0, 5.0, -2.0))
+V, T = SIGNALS.v, SIGNALS.t
+SIGN = np.sign(V[:, 1] + V[:, 2])
+
+
+@pytest.mark.parametrize(
+    ("kind", "joints", "values", "expected"),
+    [
+        ("asymmetric_friction", (1,), (5.0, 2.0), [np.where(V[:, 1] > 0, 5.0, -2.0)]),
+        ("load_dependent_friction", (1,), (0.07,), [0.07 * (abs(SIGNALS.load) * np.sign(V)).T[1]]),
+        ("friction_drift", (0,), (-0.2, 0.3), [T * (-0.2 * np.sign(V) + 0.3 * V).T[0]]),
+        # Of the TX40: τ5 += fv6 v6 + fs6 sgn(v5 + v6), τ6 += fv6 v5 + fs6 sgn(v5 + v6).
+        ("coupled_friction", (1, 2), (0.8, 1.5), [0.8 * V.T[j] + 1.5 * SIGN for j in (2, 1)]),
+    ],
+)
+def test_formulas(
+    kind: str, joints: tuple[int, ...], values: tuple[float, ...], expected: list[Array]
+) -> None:
+    shape = {"direction": 1.0} if kind == "coupled_friction" else {}
+    tau = kind_named(kind)(joints, shape).torque(SIGNALS, np.array(values))
+    fast = np.abs(V[:, joints].sum(axis=1)) > 0.01
+    for joint, torque in zip(joints, expected, strict=True):
+        assert tau[fast, joint] == pytest.approx(torque[fast])
+    assert not np.delete(tau, joints, axis=1).any()
 
 
 @pytest.mark.parametrize("power", [0.5, 2.0, 3.0])
@@ -56,17 +63,6 @@ def test_stribeck_friction_is_gone_at_three_times_its_speed() -> None:
     assert speeds == pytest.approx(fastest * np.geomspace(0.01, 0.3, 5))
     slow = Signals(**{**vars(SIGNALS), "v": SIGNALS.v * 1e-3})
     assert [s["stribeck_speed"] for s in StribeckFriction.grid(ROBOT, (2,), [slow])] == [0.005]
-
-
-def test_coupled_friction_is_that_of_the_tx40() -> None:
-    """τ5 += fv6 v6 + fs6 sgn(v5 + v6), τ6 += fv6 v5 + fs6 sgn(v5 + v6)."""
-    tau = CoupledFriction((1, 2), {"direction": 1.0}).torque(SIGNALS, np.array([0.8, 1.5]))
-    v5, v6 = SIGNALS.v[:, 1], SIGNALS.v[:, 2]
-    fast = np.abs(v5 + v6) > 0.01
-    sign = np.sign(v5 + v6)
-    assert tau[fast, 1] == pytest.approx((0.8 * v6 + 1.5 * sign)[fast])
-    assert tau[fast, 2] == pytest.approx((0.8 * v5 + 1.5 * sign)[fast])
-    assert not tau[:, 0].any()
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
