@@ -8,13 +8,14 @@ import pytest
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence, Grams, JointGram
 from excite_cli.diagnosis.noise_model import NoiseModel
-from excite_cli.diagnosis.schur import ABSORBED
+from excite_cli.diagnosis.schur import ABSORBED, Cholesky
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.armature import Armature
 from excite_cli.effects.torque_gain import TorqueGain
 from excite_cli.robot.model import Array
 from tests.diagnosis.explicit_data import (
     FIXED,
+    FOLDS,
     NOTHING,
     PRIOR,
     WEIGHED,
@@ -327,3 +328,56 @@ def test_sums_over_folds_and_joints(grams_and_full: tuple[Grams, np.ndarray]) ->
     assert grams.total() == pytest.approx(full.sum(axis=(0, 1, 2)))
     assert grams.seen() == pytest.approx(np.einsum("fsjkk->fsk", full).reshape(-1, SIZE))
     assert grams.torque_energy(1) == pytest.approx(full[:, :, 1, -1, -1].sum())
+
+
+@pytest.mark.parametrize("size", [1, 2, 30])
+def test_one_and_many_right_sides(size: int) -> None:
+    rng = np.random.default_rng(size)
+    rows = rng.normal(size=(2 * size, size))
+    matrix, rhs = rows.T @ rows, rng.normal(size=(size, 3))
+    kept = matrix.copy(), rhs.copy()
+    factor = Cholesky(matrix)
+    assert factor.solve(rhs) == pytest.approx(np.linalg.solve(matrix, rhs), rel=1e-8)
+    assert factor.solve(rhs[:, 0]) == pytest.approx(np.linalg.solve(matrix, rhs[:, 0]), rel=1e-8)
+    assert np.array_equal(matrix, kept[0])
+    assert np.array_equal(rhs, kept[1])
+
+
+def test_what_is_not_positive_definite_has_no_factor() -> None:
+    with pytest.raises(np.linalg.LinAlgError, match="column 2 of 3"):
+        Cholesky(np.diag([1.0, -1.0, 1.0]))
+
+
+@pytest.mark.parametrize("chosen", [(), (0,), (2,), (1, 3), (3, 2, 0), (4, 1)])
+@pytest.mark.parametrize("joint", [0, 1])
+def test_columns_times_parameters_are_the_model_of_that_joint(
+    chosen: tuple[int, ...], joint: int
+) -> None:
+    """Against torque added up effect by effect, sample by sample."""
+    data, candidates = random_data(11), random_candidates(11)
+    widths = [candidates[i].width for i in chosen]
+    theta = np.random.default_rng(0).normal(size=FIXED + sum(widths))
+    starts = FIXED + np.cumsum([0, *widths])
+    for part in range(len(FOLDS)):
+        found = data.columns(candidates, chosen, part, joint)
+        assert found.shape == (len(data.tau[part]), FIXED + sum(widths))
+        for t in range(0, len(data.tau[part]), 7):
+            expected = float(data.declared[part][t, joint] @ theta[:FIXED])
+            for i, start in zip(chosen, starts, strict=False):
+                own = candidates[i]
+                values = theta[start : start + own.width]
+                for row, acts_on in enumerate(own.rows):
+                    if acts_on == joint:
+                        expected += float(own.columns[part][t, row] @ values)
+            assert found[t] @ theta == pytest.approx(expected)
+
+
+def test_columns_and_residuals_say_the_same() -> None:
+    data, candidates = random_data(12), random_candidates(12)
+    chosen = (3, 2, 1)
+    theta = np.random.default_rng(1).normal(size=FIXED + 4)
+    for part, rest in enumerate(data.residuals(candidates, chosen, theta)):
+        assert np.array_equal(data.tau[part], random_data(12).tau[part]), "untouched"
+        for joint in range(data.n):
+            model = data.columns(candidates, chosen, part, joint) @ theta
+            assert rest[:, joint] == pytest.approx(data.tau[part][:, joint] - model)

@@ -9,10 +9,11 @@ import pytest
 from excite_cli.diagnosis.records import Assumption, Diagnosis
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.diagnosis.words import assumption_in_words
+from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION
 from excite_cli.identification.split import split
-from excite_cli.measurement.dataset import Dataset, Run
+from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.robot.model import Array
-from tests.diagnosis.simulated_arm import ELBOW, ROBOT, planted, played, told
+from tests.diagnosis.simulated_arm import ELBOW, PITCH, ROBOT, planted, played, told
 
 RATE = 200.0
 # What may differ: what is measured on the held-out part, and the time it took.
@@ -171,3 +172,28 @@ def test_what_the_held_out_run_has_is_confirmed_and_what_it_lacks_is_harmful(
         for name in ("relative", "rms", "relative_moving"):
             expected = getattr(before, name)[joint] - getattr(after, name)[joint]
             assert getattr(removed, name) == expected
+
+
+def confirmed(found: Diagnosis) -> set[str]:
+    return {e.effect.kind for e in found.effects if e.verdict is HeldOutVerdict.CONFIRMED}
+
+
+def test_what_is_confirmed_waits_for_the_setup() -> None:
+    """Not where the config resolves the doubt, nor for speeds that nothing needs."""
+    by_load = planted("load_dependent_friction", PITCH, 0.15)
+    data = played([planted("coulomb_friction", ELBOW, 1.5), by_load])
+
+    def doubted(change: dict[str, Any], *keys: str) -> Diagnosis:
+        doubt = Finding("clock", "warning", "a second lasts 0.7 s", "", (), change)
+        kinds = "viscous_friction,coulomb_friction,load_dependent_friction"
+        return told(replace(data, findings=(doubt,)), kinds, *keys)
+
+    clock = {"measurement.clock": 0.7}
+    still_open = doubted(clock)
+    assert confirmed(still_open) <= {*EVERYDAY_FRICTION, *EVERYDAY}
+    assert any(each.kind == "open_setup" for each in still_open.findings)
+    for trust in ("[clock]", "true"):
+        resolved = doubted(clock, f"measurement.trust={trust}")
+        assert "load_dependent_friction" in confirmed(resolved), trust
+    speeds = doubted({"measurement.channels": {"dq": None}})
+    assert "load_dependent_friction" in confirmed(speeds)

@@ -136,6 +136,12 @@ def test_a_cut_leaves_what_is_beside_it() -> None:
     rest = search_loop.beside_cuts(search_loop.Fit(np.zeros(10), effects, values, np.ones(4), 1.0))
     assert rest.effects == (effects[0], effects[2])
     assert rest.values.tolist() == [0.5, 0.6, *sizes[0] * [0], *sizes[2] * [2]]
+    # A search without cuts knows no kind of them.
+    cut = catalogue()["torque_saturation"]((1,), {"level": 3.0})
+    blind = search_loop._without_kinds(DiagnosisSpec(exclude=["backlash"]), [cut])
+    assert (blind.exclude, blind.rounds) == (["backlash", "torque_saturation"], 60)
+    alone = DiagnosisSpec(kinds=["torque_saturation"])
+    assert search_loop._without_kinds(alone, [cut]).rounds == 0
 
 
 def test_what_is_beside_a_cut_is_looked_for_without_its_samples(
@@ -145,14 +151,6 @@ def test_what_is_beside_a_cut_is_looked_for_without_its_samples(
     name, began = answer_of(monkeypatch, ["cut4", "cut5", "cut5.1", "cut5.1"], [1.0] * 4)
     assert name == "cut5.1"
     assert began == ["declared", "rest", "clean", "rest", "clean", "cut5.1"]
-
-
-def test_a_search_without_cuts_knows_no_kind_of_them() -> None:
-    cut = catalogue()["torque_saturation"]((1,), {"level": 3.0})
-    blind = search_loop._without_kinds(DiagnosisSpec(exclude=["backlash"]), [cut])
-    assert (blind.exclude, blind.rounds) == (["backlash", "torque_saturation"], 60)
-    alone = DiagnosisSpec(kinds=["torque_saturation"])
-    assert search_loop._without_kinds(alone, [cut]).rounds == 0
 
 
 def test_a_pass_that_is_cut_short_keeps_what_the_pass_before_it_found() -> None:

@@ -18,8 +18,6 @@ from tests.robot.random_robots import random_robot
 
 ROBOT = random_robot(5, joints=3, branches=False, prismatic=False)
 SIGNALS = signals_of(ROBOT, 400)
-
-
 V, T = SIGNALS.v, SIGNALS.t
 SIGN = np.sign(V[:, 1] + V[:, 2])
 

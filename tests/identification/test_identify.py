@@ -48,13 +48,13 @@ def test_the_held_out_run_does_not_touch_the_fit(data: Dataset) -> None:
     assert first.error.mean_relative == pytest.approx(first.training_error.mean_relative, rel=0.5)
 
 
-def test_a_single_run_is_cut_into_blocks(data: Dataset) -> None:
+def test_a_single_run_is_cut_into_blocks_and_a_torque_of_the_wrong_sign_is_noticed(
+    data: Dataset,
+) -> None:
     found = run(replace(data, runs=data.runs[:1]))
     assert "blocks" in found.held_out_run
     assert found.fit.values[found.fit.rank :] == pytest.approx(VALUES, rel=0.15)
-
-
-def test_a_torque_of_the_wrong_sign_is_noticed(data: Dataset) -> None:
+    # A torque of the wrong sign is noticed.
     runs = tuple(replace(run, tau=-run.tau) for run in data.runs)
     found = run(replace(data, runs=runs))
     texts = [finding.text for finding in found.findings if finding.kind == "negative"]

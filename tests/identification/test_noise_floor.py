@@ -107,6 +107,18 @@ def test_no_floor_without_two_periods() -> None:
     robot = random_robot(3, joints=2)
     data = measured(robot, standard_parameters(robot), noise=0.1, seeds=(1, 2))
     assert noise_floor(data.runs, processing_of(data.runs)) is None
+    # The period to a fraction of a sample.
+    rng = np.random.default_rng(4)
+    for period in (WHOLE, BROKEN, 3.33712):
+        run = waves(period, 3.4 * period)
+        q = run.q + 1e-4 * rng.normal(size=run.q.shape)
+        known = np.ones(len(q), bool)
+        assert exact_period(q, known) == pytest.approx(period * RATE, abs=0.01)
+        known[300:500] = known[900:1000] = False
+        q[~known] = 1e3
+        assert exact_period(q, known) == pytest.approx(period * RATE, abs=0.01)
+    assert exact_period(np.cumsum(rng.normal(size=(1000, 2)), axis=0), np.ones(1000, bool)) is None
+    assert exact_period(np.zeros((1000, 2)), np.ones(1000, bool)) is None
 
 
 def test_a_constant_drift_is_part_of_the_floor_to_the_digit() -> None:
@@ -170,20 +182,6 @@ def test_periods_that_begin_unevenly_are_told() -> None:
     (told,) = found.noticed(("a", "b"))
     assert (told.kind, told.severity, told.joints) == ("uneven_periods", "note", ("a", "b"))
     np.testing.assert_allclose(found.misalignment, found.rms, rtol=0.2)
-
-
-def test_the_period_to_a_fraction_of_a_sample() -> None:
-    rng = np.random.default_rng(4)
-    for period in (WHOLE, BROKEN, 3.33712):
-        run = waves(period, 3.4 * period)
-        q = run.q + 1e-4 * rng.normal(size=run.q.shape)
-        known = np.ones(len(q), bool)
-        assert exact_period(q, known) == pytest.approx(period * RATE, abs=0.01)
-        known[300:500] = known[900:1000] = False
-        q[~known] = 1e3
-        assert exact_period(q, known) == pytest.approx(period * RATE, abs=0.01)
-    assert exact_period(np.cumsum(rng.normal(size=(1000, 2)), axis=0), np.ones(1000, bool)) is None
-    assert exact_period(np.zeros((1000, 2)), np.ones(1000, bool)) is None
 
 
 def test_a_complete_model_leaves_the_floor_and_an_incomplete_one_more() -> None:

@@ -95,7 +95,7 @@ def test_averages_lower_white_noise_without_folding_it() -> None:
     assert found.tau.std() == pytest.approx(expected, rel=0.1)
 
 
-def test_borders_are_cut() -> None:
+def test_borders_are_cut_and_measured_speeds_used_when_asked_for() -> None:
     run = recorded()
     found = ready(run, border=1.0)
     assert found.t[0] == pytest.approx(1.0)
@@ -104,6 +104,13 @@ def test_borders_are_cut() -> None:
     centers = found.averaged(found.t)
     assert centers[0] > 1.0
     assert centers[-1] < run.t[-1] - 1.0
+    # Measured speeds are used when asked for.
+    run = recorded(encoder=0.0)
+    assert run.dq is not None
+    found = ready(replace(run, dq=2 * run.dq), velocity="measured")
+    _, v, a = fourier(found.t)
+    assert relative(found.v, 2 * v) < 1e-3
+    assert relative(found.a, 2 * a) < 5e-3
 
 
 @pytest.mark.parametrize("fs", [100.0, 500.0, 997.0])
@@ -190,15 +197,6 @@ def test_what_a_joint_does_while_it_sticks_takes_no_part_in_fits(
     assert found.tau.max() > 0.1
     for j in range(2):
         assert found.tau_fit[found.usable[:, j], j].any() == seen
-
-
-def test_measured_speeds_are_used_when_asked_for() -> None:
-    run = recorded(encoder=0.0)
-    assert run.dq is not None
-    found = ready(replace(run, dq=2 * run.dq), velocity="measured")
-    _, v, a = fourier(found.t)
-    assert relative(found.v, 2 * v) < 1e-3
-    assert relative(found.a, 2 * a) < 5e-3
 
 
 def test_runs_too_short_or_too_slow_are_refused_in_words() -> None:
