@@ -28,6 +28,7 @@ from excite_cli.excitation.result import Result
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.robot.model import Robot
 from tests.cli.program import SMOKE
+
 pytest.importorskip("mujoco")
 
 from excite_cli.simulation.ground_truth import plant
