@@ -24,11 +24,7 @@ LOGS = Path(__file__).resolve().parents[2] / "data"
 URDFS = {"kr300": "kr300.urdf", "tx40": "tx40_mdh_modified.urdf", "ur10_cb": "ur10.urdf"}
 SPEC: Spec = load_spec(Path(__file__).resolve().parents[2] / "configs" / "ur10.yaml")
 SIZES = [10.0, 15.0, 8.0, 3.0, 2.0, 1.0]  # N·m of dry friction
-
-
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return arm()
+ROBOT = arm()
 
 
 def friction(j: int, size: float) -> Planted:
@@ -36,14 +32,14 @@ def friction(j: int, size: float) -> Planted:
 
 
 @pytest.fixture(scope="module")
-def rubbing(robot: Robot) -> Dataset:
+def rubbing() -> Dataset:
     effects = [friction(j, size) for j, size in enumerate(SIZES)]
-    return played(robot, *effects, torque_noise=0.01, inertia_error=0.3).dataset
+    return played(ROBOT, *effects, torque_noise=0.01, inertia_error=0.3).dataset
 
 
 @pytest.fixture(scope="module")
-def frictionless(robot: Robot) -> Dataset:
-    return played(robot, torque_noise=0.01, inertia_error=0.1).dataset
+def frictionless() -> Dataset:
+    return played(ROBOT, torque_noise=0.01, inertia_error=0.1).dataset
 
 
 def told(robot: Robot, data: Dataset, spec: Spec = SPEC) -> str:
@@ -72,53 +68,11 @@ def negative(j: int, n: int = 6) -> Array:
     return np.where(np.arange(n) == j, -1.0, 1.0)
 
 
-def test_clean_data_raise_no_alarm(robot: Robot, rubbing: Dataset, frictionless: Dataset) -> None:
-    assert told(robot, rubbing) == ""
-    assert told(robot, frictionless) == ""
-
-
-@pytest.mark.parametrize("j", range(6))
-def test_a_torque_or_a_position_of_other_sign(robot: Robot, rubbing: Dataset, j: int) -> None:
-    name = robot.joint_names[j]
-    message = told(robot, changed(rubbing, tau=negative(j)))
-    assert f"torque of {name} has the opposite sign" in message
-    message = told(robot, changed(rubbing, q=negative(j)))
-    # Of light wrists, torque and position cannot be told apart, and both are named.
-    assert f"measurement.position_sign: {{{name}: -1}}" in message
-    assert j > 2 or "set measurement.sign" not in message
-
-
-def test_what_is_declared_is_not_judged(robot: Robot, rubbing: Dataset) -> None:
-    """A sign given for a joint settles that joint alone, `trust` everything."""
-    name, other = robot.joint_names[1], robot.joint_names[2]
-
-    def with_(**declared: object) -> Spec:
-        measured = SPEC.measurement.model_copy(update=declared)
-        return SPEC.model_copy(update={"measurement": measured})
-
-    wrong = changed(rubbing, tau=negative(1))
-    message = told(robot, wrong)
-    assert f"measurement.sign: {{{name}: -1}}" in message
-    assert f"If that is right as it is, say so: measurement.sign: {{{name}: 1}}." in message
-    assert "measurement.sign" not in told(robot, wrong, with_(sign={name: 1}))
-    assert name in told(robot, wrong, with_(sign={other: 1}))
-    reversed_ = changed(rubbing, order=np.arange(6)[::-1])
-    assert "measurement.trust: [order of columns]" in told(robot, reversed_)
-    assert told(robot, reversed_, with_(trust=True)) == ""
-
-
-def test_inertias_of_a_wrist_may_be_anything(robot: Robot) -> None:
-    """Centres of mass 3 cm off turn a light wrist's torque round; nobody is refused for it."""
-    phi = standard_parameters(robot).reshape(-1, 10).copy()
-    for body in phi:
-        body[1:4] -= 0.03 * body[0] * np.sign(body[1:4] + 1e-12)
-    true = replace(robot, model=robot_with(robot, phi.ravel()))
-    data = played(true, torque_noise=0.01, inertia_error=0.1).dataset
-    assert check_dataset(robot, data, SPEC) == ()
-
-
-def test_torques_of_joints_that_stand_are_not_judged(robot: Robot, rubbing: Dataset) -> None:
-    """What they carry is up to their friction: anything."""
+def test_clean_data_raise_no_alarm(rubbing: Dataset, frictionless: Dataset) -> None:
+    assert told(ROBOT, rubbing) == ""
+    assert told(ROBOT, frictionless) == ""
+    # Torques of joints that stand are not judged. What they carry is up to their friction:
+    # anything.
     rng = np.random.default_rng(0)
 
     def with_rest(run: Run) -> Run:
@@ -127,11 +81,56 @@ def test_torques_of_joints_that_stand_are_not_judged(robot: Robot, rubbing: Data
         tau[:, 2:] = 50 * rng.normal(size=(len(tau), 4))
         return replace(run, q=q, tau=tau, dq=None)
 
-    assert told(robot, replace(rubbing, runs=tuple(map(with_rest, rubbing.runs)))) == ""
+    assert told(ROBOT, replace(rubbing, runs=tuple(map(with_rest, rubbing.runs)))) == ""
+    # A wrist without friction cannot be judged and nothing wrong is said. The last link's torque
+    # comes from a centre of mass that the URDF puts on its axis: which side it is on, the sign of
+    # the torque, nobody can know. No other joint may be accused.
+    message = told(ROBOT, changed(frictionless, tau=negative(5)))
+    assert message == "" or "torque of wrist_3_joint has the opposite sign" in message
 
 
-def test_all_torques_of_other_sign(robot: Robot, rubbing: Dataset) -> None:
-    message = told(robot, changed(rubbing, tau=-np.ones(6)))
+@pytest.mark.parametrize("j", range(6))
+def test_a_torque_or_a_position_of_other_sign(rubbing: Dataset, j: int) -> None:
+    name = ROBOT.joint_names[j]
+    message = told(ROBOT, changed(rubbing, tau=negative(j)))
+    assert f"torque of {name} has the opposite sign" in message
+    message = told(ROBOT, changed(rubbing, q=negative(j)))
+    # Of light wrists, torque and position cannot be told apart, and both are named.
+    assert f"measurement.position_sign: {{{name}: -1}}" in message
+    assert j > 2 or "set measurement.sign" not in message
+
+
+def test_what_is_declared_is_not_judged(rubbing: Dataset) -> None:
+    """A sign given for a joint settles that joint alone, `trust` everything."""
+    name, other = ROBOT.joint_names[1], ROBOT.joint_names[2]
+
+    def with_(**declared: object) -> Spec:
+        measured = SPEC.measurement.model_copy(update=declared)
+        return SPEC.model_copy(update={"measurement": measured})
+
+    wrong = changed(rubbing, tau=negative(1))
+    message = told(ROBOT, wrong)
+    assert f"measurement.sign: {{{name}: -1}}" in message
+    assert f"If that is right as it is, say so: measurement.sign: {{{name}: 1}}." in message
+    assert "measurement.sign" not in told(ROBOT, wrong, with_(sign={name: 1}))
+    assert name in told(ROBOT, wrong, with_(sign={other: 1}))
+    reversed_ = changed(rubbing, order=np.arange(6)[::-1])
+    assert "measurement.trust: [order of columns]" in told(ROBOT, reversed_)
+    assert told(ROBOT, reversed_, with_(trust=True)) == ""
+
+
+def test_inertias_of_a_wrist_may_be_anything() -> None:
+    """Centres of mass 3 cm off turn a light wrist's torque round; nobody is refused for it."""
+    phi = standard_parameters(ROBOT).reshape(-1, 10).copy()
+    for body in phi:
+        body[1:4] -= 0.03 * body[0] * np.sign(body[1:4] + 1e-12)
+    true = replace(ROBOT, model=robot_with(ROBOT, phi.ravel()))
+    data = played(true, torque_noise=0.01, inertia_error=0.1).dataset
+    assert check_dataset(ROBOT, data, SPEC) == ()
+
+
+def test_all_torques_of_other_sign(rubbing: Dataset) -> None:
+    message = told(ROBOT, changed(rubbing, tau=-np.ones(6)))
     assert "torque of every joint has the opposite sign" in message
     assert "position" not in message.split("As they are")[0].replace("position_sign", "")
 
@@ -145,16 +144,16 @@ ORDERS = {
 
 
 @pytest.mark.parametrize("name", ORDERS)
-def test_torques_in_another_order(robot: Robot, rubbing: Dataset, name: str) -> None:
+def test_torques_in_another_order(rubbing: Dataset, name: str) -> None:
     order = np.array(ORDERS[name])
-    message = told(robot, changed(rubbing, order=order))
-    moved = [robot.joint_names[j] for j in range(6) if order[j] != j]
+    message = told(ROBOT, changed(rubbing, order=order))
+    moved = [ROBOT.joint_names[j] for j in range(6) if order[j] != j]
     assert "torques" in message.split("As they are")[0]
     assert all(joint in message for joint in moved)
     assert "has the opposite sign" not in message.split("As they are")[0]
 
 
-def test_torques_in_another_order_beside_joints_without_any(robot: Robot, rubbing: Dataset) -> None:
+def test_torques_in_another_order_beside_joints_without_any(rubbing: Dataset) -> None:
     """What is not known is neither exchanged nor blamed."""
 
     def without_wrist(data: Dataset) -> Dataset:
@@ -162,32 +161,23 @@ def test_torques_in_another_order_beside_joints_without_any(robot: Robot, rubbin
         runs = [replace(r, tau=r.tau * known, valid=r.usable() & known) for r in data.runs]
         return replace(data, runs=tuple(runs))
 
-    assert told(robot, without_wrist(rubbing)) == ""
-    message = told(robot, without_wrist(changed(rubbing, order=np.array(ORDERS["swap"]))))
+    assert told(ROBOT, without_wrist(rubbing)) == ""
+    message = told(ROBOT, without_wrist(changed(rubbing, order=np.array(ORDERS["swap"]))))
     said = message.split("As they are")[0]
-    names = robot.joint_names
+    names = ROBOT.joint_names
     assert "torques" in said
     assert [name in said for name in names] == [False, True, True, False, False, False]
 
 
 @pytest.mark.parametrize("name", ["swap", "shift", "reversal"])
-def test_whole_joints_in_another_order(robot: Robot, rubbing: Dataset, name: str) -> None:
+def test_whole_joints_in_another_order(rubbing: Dataset, name: str) -> None:
     order = np.array(ORDERS[name])
-    message = told(robot, changed(rubbing, order=order, motion_order=order))
+    message = told(ROBOT, changed(rubbing, order=order, motion_order=order))
     assert "the columns" in message
     assert "measurement.names" in message
     j = int(np.flatnonzero(order != np.arange(6))[0])
     # File column j carries the name of j, but holds joint order[j].
-    assert f"{robot.joint_names[j]}: {robot.joint_names[order[j]]}" in message
-
-
-def test_a_wrist_without_friction_cannot_be_judged_and_nothing_wrong_is_said(
-    robot: Robot, frictionless: Dataset
-) -> None:
-    """The last link's torque comes from a centre of mass that the URDF puts on its axis: which
-    side it is on, the sign of the torque, nobody can know. No other joint may be accused."""
-    message = told(robot, changed(frictionless, tau=negative(5)))
-    assert message == "" or "torque of wrist_3_joint has the opposite sign" in message
+    assert f"{ROBOT.joint_names[j]}: {ROBOT.joint_names[order[j]]}" in message
 
 
 @pytest.mark.parametrize("name", URDFS)

@@ -1,7 +1,6 @@
 """The description alone: mistakes planted into random arms of solid bodies, and sound ones."""
 
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -91,41 +90,30 @@ def test_sound_arms_are_quiet(seed: int) -> None:
     assert judged(arms(seed)) == []
 
 
-def heavy(link: Link) -> None:
-    link["mass"] *= 1e3
-    link["inertia"] = link["inertia"] * 1e3
-
-
-def light(link: Link) -> None:
-    link["mass"] *= 1e-4
-    link["inertia"] = link["inertia"] * 1e-4
-
-
-def in_grams(link: Link) -> None:
-    link["inertia"] = link["inertia"] * 1e3
-
-
-def far_centre(link: Link) -> None:
-    link["centre"] = link["centre"] + 1.5 * link["size"][0]
+def scaled(link: Link, mass: float = 1.0, inertia: float = 1.0, off: float = 0.0) -> None:
+    """With its centre so many lengths farther off."""
+    link["mass"] *= mass
+    link["inertia"] = link["inertia"] * inertia
+    link["centre"] = link["centre"] + off * link["size"][0]
 
 
 @few_examples
 @given(seeds, st.integers(0, 3))
 @pytest.mark.parametrize(
-    ("plant", "kind"),
+    ("change", "kind"),
     [
-        (heavy, "density"),
-        (light, "density"),
-        (in_grams, "outside_shape"),
-        (far_centre, "outside_shape"),
+        ({"mass": 1e3, "inertia": 1e3}, "density"),
+        ({"mass": 1e-4, "inertia": 1e-4}, "density"),
+        ({"inertia": 1e3}, "outside_shape"),  # in grams
+        ({"off": 1.5}, "outside_shape"),
     ],
 )
 def test_one_link_that_does_not_fit_its_shape(
-    plant: Callable[[Link], None], kind: str, seed: int, at: int
+    change: dict[str, float], kind: str, seed: int, at: int
 ) -> None:
     links = arms(seed)
     for link in links[2 * at : 2 * at + 2]:  # the same on both sides
-        plant(link)
+        scaled(link, **change)
     found = judged(links)
     assert [(each.kind, each.status) for each in found] == [(kind, "doubt")]
     assert set(found[0].joints) == {f"to_left_{at}", f"to_right_{at}"}
@@ -138,7 +126,7 @@ def test_one_link_that_does_not_fit_its_shape(
 def test_links_that_are_held_stand_in_their_own_frames(seed: int) -> None:
     links = arms(seed)
     assert judged(links, joints=["to_left_0"]) == []
-    far_centre(links[4])
+    scaled(links[4], off=1.5)
     found = judged(links, joints=["to_left_0"])
     assert [each.joints for each in found] == [("to_left_0",)]
     assert found[0].evidence.startswith("left_2: ")
@@ -170,22 +158,24 @@ def test_halves_that_differ(seed: int, factor: float, what: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("left", "right"),
-    [("l_arm", "r_arm"), ("arm_L", "arm_R"), ("LArmLink", "RArmLink"), ("FL_hip", "FR_hip"),
-     ("LH_HIP", "RH_HIP"), ("LeftFoot", "RightFoot"), ("L_l1", "R_l1")],
-)  # fmt: skip
-def test_names_of_two_sides(left: str, right: str) -> None:
+    ("left", "right", "two_sides"),
+    [
+        ("l_arm", "r_arm", True),
+        ("arm_L", "arm_R", True),
+        ("LArmLink", "RArmLink", True),
+        ("FL_hip", "FR_hip", True),
+        ("LH_HIP", "RH_HIP", True),
+        ("LeftFoot", "RightFoot", True),
+        ("L_l1", "R_l1", True),
+        ("L_lf_1", "L_rf_1", False),  # a little and a ring finger
+    ],
+)
+def test_names_of_two_sides(left: str, right: str, two_sides: bool) -> None:
     links = arms(1, joints=1)
     links[0]["name"], links[1]["name"] = left, right
     links[1]["mass"] *= 2.0
-    assert f"{left} and {right}" in judged(links)[0].evidence
-
-
-def test_a_little_and_a_ring_finger_are_no_two_sides() -> None:
-    links = arms(1, joints=1)
-    links[0]["name"], links[1]["name"] = "L_lf_1", "L_rf_1"
-    links[1]["mass"] *= 2.0
-    assert judged(links) == []
+    told = [each.evidence for each in judged(links)]
+    assert [f"{left} and {right}" in words for words in told] == [True] * two_sides
 
 
 @pytest.mark.parametrize("key", ["velocity", "effort"])
@@ -202,25 +192,23 @@ def test_limits_of_zero(key: str) -> None:
 def test_shapes_that_cannot_be_read_are_none(tmp_path: Path) -> None:
     links = arms(3)
     for link in links[:4]:
-        heavy(link)
+        scaled(link, 1e3, 1e3)
     text = urdf_of(links).replace('<box size="', '<mesh filename="missing.stl" was="', 2)
     (tmp_path / "arms.urdf").write_text(text, encoding="utf-8")
     found = of_description(build_robot(RobotSpec(urdf="arms.urdf"), tmp_path))
     assert [each.joints for each in found] == [("to_left_1", "to_right_1")]
+    # Rows of inspect without data.
+    (tmp_path / "arms.urdf").write_text(urdf_of(arms(5)), encoding="utf-8")
+    found = inspect(load_case({"robot": {"urdf": str(tmp_path / "arms.urdf")}}))
+    assert tuple(each.name for each in found.results) == NAMES[:4]
+    assert all(each.status == "ok" for each in found.results)
 
 
 def test_the_ground_is_in_no_torque() -> None:
     links = arms(4, joints=2)
     for link in links:
-        in_grams(link)
+        scaled(link, inertia=1e3)
     joints = ["to_left_1", "to_right_1"]
     assert judged(links, joints=joints)[0].joints == tuple(joints)
     floating = judged(links, joints=joints, base="floating", rows=("base", "joints"))
     assert "left_0" in floating[0].evidence
-
-
-def test_rows_of_inspect_without_data(tmp_path: Path) -> None:
-    (tmp_path / "arms.urdf").write_text(urdf_of(arms(5)), encoding="utf-8")
-    found = inspect(load_case({"robot": {"urdf": str(tmp_path / "arms.urdf")}}))
-    assert tuple(each.name for each in found.results) == NAMES[:4]
-    assert all(each.status == "ok" for each in found.results)

@@ -17,6 +17,7 @@ from excite_cli.config.load import load_spec
 from excite_cli.errors import ExciteWarning
 from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing
+from tests.effects import own_package
 from tests.simulation.arms import arm, played
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "check.md"
@@ -38,12 +39,7 @@ def _read_anew() -> Iterator[None]:
 def install(folder: Path, code: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """What an installer leaves of the package of the page."""
     points = tomllib.loads(block("toml"))["project"]["entry-points"][GROUP]
-    (folder / "my_checks.py").write_text(code, encoding="utf-8")
-    info = folder / "my_checks-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my_checks\nVersion: 1.0\n")
-    lines = [f"[{GROUP}]", *(f"{name} = {value}" for name, value in points.items())]
-    (info / "entry_points.txt").write_text("\n".join(lines) + "\n")
+    own_package.install(folder, code, points, "my_checks", GROUP)
     monkeypatch.syspath_prepend(folder)
     monkeypatch.delitem(sys.modules, "my_checks", raising=False)
 

@@ -12,10 +12,13 @@ from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.robot.model import Robot, build_robot
 from tests.base_link.stander import Array
 
-_LIMITS = '<limit lower="-2.5" upper="2.5" velocity="5" effort="900"/>'
-_THIGH, _SHANK = 0.35, 0.35
+_BONE = 0.35
 SIDES, PARTS = ("left", "right"), ("hip", "knee", "ankle")
 JOINTS = tuple(f"{side}_{part}" for side in SIDES for part in PARTS)
+_SOLE = (
+    '<collision><origin xyz="0.02 0 -0.03"/><geometry><box size="0.24 0.12 0.02"/></geometry>'
+    "</collision>"
+)
 
 
 def _link(name: str, mass: float, center: str, shape: str = "") -> str:
@@ -26,34 +29,25 @@ def _link(name: str, mass: float, center: str, shape: str = "") -> str:
     )
 
 
-def _joint(name: str, parent: str, child: str, place: str) -> str:
-    return (
-        f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>'
-        f'<origin xyz="{place}"/><axis xyz="0 1 0"/>{_LIMITS}</joint>'
-    )
-
-
 def _leg(side: str, y: float) -> str:
-    sole = (
-        '<collision><origin xyz="0.02 0 -0.03"/><geometry><box size="0.24 0.12 0.02"/></geometry>'
-        "</collision>"
-    )
-    return "".join(
-        [
-            _link(f"{side}_thigh", 5.0, "0 0 -0.15"),
-            _link(f"{side}_shank", 3.0, "0 0 -0.15"),
-            _link(f"{side}_foot", 1.0, "0.02 0 -0.02", sole),
-            _joint(f"{side}_hip", "pelvis", f"{side}_thigh", f"0 {y} 0"),
-            _joint(f"{side}_knee", f"{side}_thigh", f"{side}_shank", f"0 0 {-_THIGH}"),
-            _joint(f"{side}_ankle", f"{side}_shank", f"{side}_foot", f"0 0 {-_SHANK}"),
-        ]
-    )
+    bones = [
+        _link(f"{side}_thigh", 5.0, "0 0 -0.15"),
+        _link(f"{side}_shank", 3.0, "0 0 -0.15"),
+        _link(f"{side}_foot", 1.0, "0.02 0 -0.02", _SOLE),
+    ]
+    names = ["pelvis", *(f"{side}_{bone}" for bone in ("thigh", "shank", "foot"))]
+    places = (f"0 {y} 0", f"0 0 {-_BONE}", f"0 0 {-_BONE}")
+    for part, parent, child, place in zip(PARTS, names, names[1:], places, strict=False):
+        bones.append(
+            f'<joint name="{side}_{part}" type="revolute"><parent link="{parent}"/>'
+            f'<child link="{child}"/><origin xyz="{place}"/><axis xyz="0 1 0"/>'
+            '<limit lower="-2.5" upper="2.5" velocity="5" effort="900"/></joint>'
+        )
+    return "".join(bones)
 
 
-URDF = (
-    f'<robot name="biped">{_link("pelvis", 30.0, "0.02 0 0.2")}{_leg("left", 0.12)}'
-    f"{_leg('right', -0.12)}</robot>"
-)
+PELVIS = _link("pelvis", 30.0, "0.02 0 0.2")
+URDF = f'<robot name="biped">{PELVIS}{_leg("left", 0.12)}{_leg("right", -0.12)}</robot>'
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +62,7 @@ def squatting(standing: bool) -> Samples:
     extra = '<mujoco><compiler fusestatic="false" discardvisual="true"/></mujoco></robot>'
     spec = mujoco.MjSpec.from_string(URDF.replace("</robot>", extra))
     pelvis = spec.body("pelvis")
-    height = _THIGH + _SHANK + 0.04
+    height = 2 * _BONE + 0.04
     pelvis.pos = [0, 0, height]
     if standing:
         pelvis.add_freejoint()
@@ -83,16 +77,14 @@ def squatting(standing: bool) -> Samples:
     data = mujoco.MjData(model)
     dofs = [model.joint(name).dofadr[0] for name in JOINTS]
     places = [model.joint(name).qposadr[0] for name in JOINTS]
-    rows: list[tuple[Array, Array, Array, Array]] = []
+    rows: list[tuple[Array, ...]] = []
     for k in range(6000):
         bend = 0.4 - 0.35 * np.cos(0.8 * data.time)
         data.ctrl[:] = np.tile([-bend, 2.0 * bend, -bend], 2) * min(1.0, data.time)
         mujoco.mj_step(model, data)
         if k > 2500 and k % 20 == 0:
-            rows.append(
-                (data.qpos[places].copy(), data.qvel[dofs].copy(), data.qacc[dofs].copy(),
-                 data.actuator_force.copy())
-            )  # fmt: skip
+            seen = data.qpos[places], data.qvel[dofs], data.qacc[dofs], data.actuator_force
+            rows.append(tuple(each.copy() for each in seen))
     if standing:
         assert data.qpos[2] > 0.6 * height  # it has not fallen
         assert data.ncon >= 4
@@ -111,10 +103,8 @@ def test_legs_that_carry_are_told_from_legs_that_hang(robot: Robot) -> None:
     assert found.status == "fault"
     assert re.search(words, found.evidence)
     assert not standing_legs(robot, squatting(standing=False))
-
-
-def test_wrong_masses_and_loads_do_not_stand(robot: Robot) -> None:
-    """What hangs and is not as the URDF says is pulled down by it, or little."""
+    # Wrong masses and loads do not stand. What hangs and is not as the URDF says is pulled down by
+    # it, or little.
     hanging = squatting(standing=False)
     heavier = Samples(**{**vars(hanging), "tau": 1.6 * hanging.tau})
     lighter = Samples(**{**vars(hanging), "tau": 0.5 * hanging.tau})

@@ -3,7 +3,7 @@
 Nothing here uses Gram matrices: rows are whitened one at a time and stacked.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -14,12 +14,16 @@ from scipy.signal import lfilter
 from scipy.sparse import identity
 
 from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
+from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.asymmetric_friction import AsymmetricFriction
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.effects.coulomb_friction import CoulombFriction
+from excite_cli.effects.seen import Seen
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.measurement.run_identity import RunId
@@ -40,8 +44,9 @@ def anything(parameters: Array, chosen: Sequence[int], added: Sequence[int]) -> 
 
 
 def effect(kind: str, *joints: int, **shape: float) -> Effect:
-    """On joint 0 if none is named."""
-    return catalogue()[kind](joints or (0,), shape)
+    """On joint 0 if none is named, in its first shape if none is given."""
+    known = catalogue()[kind]
+    return known(joints or (0,), shape or {each.name: each.low for each in known.shapes})
 
 
 def usual_of_unit_columns(joints: int, fixed: int) -> Any:
@@ -157,45 +162,15 @@ class Rows:
         misfit = self.known[:, :-1] @ theta[:FIXED] - self.known[:, -1]
         return own + with_known * float(misfit @ misfit)
 
-    def left_out(self, chosen: Sequence[int], joints: Sequence[int]) -> list[float]:
-        """Energy per fold on the rows of `joints`, fitted to the other folds."""
-        found = []
-        for fold in range(max(FOLDS) + 1):
-            theta = self._refitted(chosen, self.fitted(chosen, self.fold != fold), fold)
-            found.append(self._energy(chosen, theta, (self.fold == fold), joints))
-        return found
-
-    def on_blocks(self, chosen: Sequence[int], new: bool) -> Array:
-        """Energy (joints, 2 folds) of the sides of folds: as those of `new` recordings, fitted to
-        the other folds, or fitted to the other sides of all."""
+    def on_blocks(self, chosen: Sequence[int]) -> Array:
+        """Energy (joints, 2 folds) of the sides of folds, fitted to the other sides of all."""
         found = np.zeros((2, max(FOLDS) + 1, 2))
         for joint, fold, side in np.ndindex(found.shape):
-            kept = self.fold != fold if new else self.side != bool(side)
-            here = (self.fold == fold) & (self.side == bool(side))
-            found[joint, fold, side] = self._energy(
-                chosen, self.fitted(chosen, kept), here, [joint]
-            )
+            here = (self.fold == fold) & (self.side == bool(side)) & (self.joint == joint)
+            theta = self.fitted(chosen, self.side != bool(side))
+            rest = self.y[here] - self.x[here][:, self.columns(chosen)] @ theta
+            found[joint, fold, side] = float(rest @ rest)
         return found.reshape(2, -1)
-
-    def _energy(
-        self, chosen: Sequence[int], theta: Array, here: np.ndarray, joints: Sequence[int]
-    ) -> float:
-        rows = here & np.isin(self.joint, joints)
-        rest = self.y[rows] - self.x[rows][:, self.columns(chosen)] @ theta
-        return float(rest @ rest)
-
-    def _refitted(self, chosen: Sequence[int], theta: Array, fold: int) -> Array:
-        """What is there in this fold alone, fitted to it, all else held."""
-        at = self.columns(chosen)
-        there = np.array([np.any(self.x[self.fold != fold][:, k] != 0) for k in at])
-        alone = ~there & (np.arange(len(at)) >= FIXED)
-        if not alone.any():
-            return theta
-        rows = self.fold == fold
-        kept = np.where(alone, 0.0, theta)
-        rest = self.y[rows] - self.x[rows][:, at] @ kept
-        kept[alone] = np.linalg.lstsq(self.x[rows][:, at[alone]], rest, rcond=None)[0]
-        return kept
 
     def projected(self, column: int, chosen: Sequence[int]) -> float:
         """Energy of a column that the model cannot imitate, as a share of all of it."""
@@ -246,4 +221,79 @@ def rows_of(
                 sides.append(data.sides.owners[part][t] % 2)
     return Rows(
         np.array(x), np.array(y), np.array(folds), np.array(joints), blocks, known, np.array(sides)
+    )  # fmt: skip
+
+
+Allowed = Callable[[Array, Sequence[int], Sequence[int]], bool]
+LARGE = Seen(np.full(2, 1e12), np.zeros(2), 1e12)
+SAMPLES = 50
+TOTAL = SAMPLES * len(FOLDS)
+RULES = Rules(0.01, 0.01)
+ONE = NoiseModel.white(np.ones(2))
+NO_MODEL: Any = None  # none of what is tried asks for it
+NO_MOTION: Any = None
+
+
+def on_joint_0(sizes: Sequence[float]) -> Array:
+    """Torque (directions, 2) of joint 0 alone."""
+    return np.stack([sizes, np.zeros(len(sizes))], axis=1)
+
+
+def planted(
+    effects: Sequence[Effect],
+    torque: Array,
+    mix: Array | None = None,
+    noise: float = 1.0,
+    declared: float = 0.0,
+    seed: int = 0,
+) -> tuple[TrainingData, list[Candidate]]:
+    """Orthogonal directions of RMS one in every part, of which columns and torque are made.
+
+    Columns of all effects in turn are directions @ `mix` (on all their joints), torque is
+    directions @ `torque` (directions, joints), `declared` of the declared model, and noise that is
+    orthogonal to all of them and of exactly this RMS. So every fold says the same.
+    """
+    rng = np.random.default_rng(seed)
+    count = FIXED + len(torque)
+    fixed, columns, tau = [], [], []
+    for _ in FOLDS:
+        free, _ = np.linalg.qr(rng.normal(size=(SAMPLES, count + 2)))
+        free *= np.sqrt(SAMPLES)
+        fixed.append(np.repeat(free[:, None, :FIXED], 2, axis=1))
+        own = free[:, FIXED:count]
+        columns.append(own if mix is None else own @ mix)
+        tau.append(own @ torque + noise * free[:, count:] + declared * free[:, :1])
+    candidates, at = [], 0
+    for one in effects:
+        block = slice(at, at + len(one.parameters))
+        blocks = tuple(np.repeat(c[:, None, block], len(one.joints), axis=1) for c in columns)
+        candidates.append(Candidate(one, one.joints, blocks))
+        at = block.stop
+    runs = tuple(prepared(np.ones((SAMPLES, 2), bool)) for _ in FOLDS)
+    return TrainingData(runs, FOLDS, tuple(fixed), tuple(tau)), candidates
+
+
+def judge_of(
+    data: TrainingData,
+    candidates: Sequence[Candidate],
+    rules: Rules = RULES,
+    allowed: Allowed | None = None,
+) -> Judgement:
+    """Samples are independent and of unit noise; sizes are those that are possible."""
+    plain = data.evidence(candidates, ONE)
+    sizes = PossibleSizes(candidates, spread_of(plain.covariance, 1.0), LARGE)
+    return Judgement(plain, plain, candidates, rules, sizes if allowed is None else allowed)
+
+
+def traced(
+    data: TrainingData,
+    candidates: Sequence[Candidate],
+    chosen: Sequence[int],
+    allowed: Allowed = anything,
+) -> SearchResult:
+    judge = judge_of(data, candidates, allowed=allowed)
+    sizes = PossibleSizes(candidates, judge.plain.covariance, Seen(np.ones(2), np.ones(2), 1.0))
+    return SearchResult(
+        data, tuple(candidates), ONE, judge, tuple(chosen), np.zeros(0), (), np.ones(2), 1.0,
+        sizes, NO_MODEL, NO_MOTION,
     )  # fmt: skip

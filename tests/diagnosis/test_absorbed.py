@@ -1,7 +1,6 @@
 """Effects that are hidden in inertial parameters, on robots where mechanics says so."""
 
 import numpy as np
-import pytest
 
 from excite_cli.config.load import load_spec
 from excite_cli.diagnosis.aliases import absorbed_effects
@@ -20,94 +19,82 @@ from excite_cli.effects.spring import Spring
 from excite_cli.effects.torque_offset import TorqueOffset
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.identification.regression import signals_of
-from excite_cli.robot.model import Robot, build_robot
+from excite_cli.robot.model import build_robot
 from tests.cli.program import SMOKE
 from tests.identification.synthetic import measured, regression_of
 
-
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    """A chain whose first joint turns about a vertical axis, z of its link."""
-    return build_robot(load_spec(SMOKE).robot, SMOKE.parent)
+# A chain whose first joint turns about a vertical axis, z of its link.
+ROBOT = build_robot(load_spec(SMOKE).robot, SMOKE.parent)
 
 
 def absorbed(
-    robot: Robot, effects: list[Effect], chosen: tuple[int, ...] = ()
+    effects: list[Effect], chosen: tuple[int, ...] = ()
 ) -> dict[tuple[str, str], Absorbed]:
     """By kind and joint, for a lively motion."""
-    dataset = measured(robot, standard_parameters(robot), noise=0.1, seconds=8.0)
-    found = regression_of(robot, dataset)
+    dataset = measured(ROBOT, standard_parameters(ROBOT), noise=0.1, seconds=8.0)
+    found = regression_of(ROBOT, dataset)
     candidates = []
     for effect in effects:
         blocks = []
         for run in found.runs:
-            signals = signals_of(run.prepared, robot)
+            signals = signals_of(run.prepared, ROBOT)
             blocks.append(
-                run.prepared.averaged_for_fit(effect.columns(signals), effect.rows(robot.n))
+                run.prepared.averaged_for_fit(effect.columns(signals), effect.rows(ROBOT.n))
             )
-        candidates.append(Candidate(effect, effect.rows(robot.n), tuple(blocks)))
+        candidates.append(Candidate(effect, effect.rows(ROBOT.n), tuple(blocks)))
     data = TrainingData(
         tuple(run.prepared for run in found.runs),
         (0, 1),
         tuple(run.inertial for run in found.runs),
         tuple(run.tau for run in found.runs),
     )
-    evidence = data.evidence(candidates, NoiseModel.white(np.ones(robot.n)))
-    records = absorbed_effects(evidence, candidates, chosen, Model(robot, found.base, (), None))
+    evidence = data.evidence(candidates, NoiseModel.white(np.ones(ROBOT.n)))
+    records = absorbed_effects(evidence, candidates, chosen, Model(ROBOT, found.base, (), None))
     return {(each.kind, each.joints[0]): each for each in records}
 
 
-def test_armature_of_the_first_joints_is_an_inertia_of_their_links(robot: Robot) -> None:
+def in_proportion(factor: float) -> Effect:
+    """To the speed of the second joint."""
+
+    class Proportional(Armature):
+        kind = "proportional"
+
+        def columns(self, signals):  # type: ignore[no-untyped-def]
+            return factor * signals.v[:, list(self.joints), None]
+
+    return Proportional((1,))
+
+
+def test_what_absorbs_an_effect() -> None:
     """Izz of link k has the column I_a a_k while what comes before turns about other axes.
 
     So for the first joint, and for the second whose axis is at right angles; not for the third,
     which is parallel to the second: there Izz shows in both rows.
     """
-    found = absorbed(robot, [Armature((j,)) for j in range(3)])
-    first, second, _ = robot.joint_names[:3]
+    found = absorbed([Armature((j,)) for j in range(3)])
+    first, second, _ = ROBOT.joint_names[:3]
     assert set(found) == {("armature", first), ("armature", second)}
     for each in found.values():
         assert all(name.startswith("I") for name in each.by)
         assert each.left < ABSORBED
+    # What a found effect absorbs is named after it. A second effect of the same form is absorbed by
+    # the one in the model, not by an inertia.
+    viscous, same = ViscousFriction((1,)), in_proportion(3.0)
+    assert absorbed([viscous, same]) == {}
+    found = absorbed([viscous, same], chosen=(0,))
+    assert found["proportional", ROBOT.joint_names[1]].by == (f"viscous[{ROBOT.joint_names[1]}]",)
 
 
-def test_friction_is_not_absorbed_and_what_refines_it_is_not_asked(robot: Robot) -> None:
+def test_what_is_not_absorbed() -> None:
     effects: list[Effect] = [ViscousFriction((0,)), CoulombFriction((1,)), TorqueOffset((2,))]
-    assert absorbed(robot, effects) == {}
+    assert absorbed(effects) == {}
 
-
-def test_what_a_found_effect_absorbs_is_named_after_it(robot: Robot) -> None:
-    """A second effect of the same form is absorbed by the one in the model, not by an inertia."""
-
-    class Same(Armature):
-        kind = "same"
-        title = "the same as viscous friction"
-
-        def columns(self, signals):  # type: ignore[no-untyped-def]
-            return 3.0 * signals.v[:, list(self.joints), None]
-
-    viscous, same = ViscousFriction((1,)), Same((1,))
-    assert absorbed(robot, [viscous, same]) == {}
-    found = absorbed(robot, [viscous, same], chosen=(0,))
-    assert found["same", robot.joint_names[1]].by == (f"viscous[{robot.joint_names[1]}]",)
-
-
-def test_what_does_not_show_at_all_is_not_absorbed(robot: Robot) -> None:
-    class Nothing(Armature):
-        kind = "nothing"
-        title = "nothing"
-
-        def columns(self, signals):  # type: ignore[no-untyped-def]
-            return 0.0 * signals.v[:, list(self.joints), None]
-
-    assert absorbed(robot, [Nothing((1,))]) == {}
-
-
-def test_refinements_runs_and_chosen_places_are_left_out(robot: Robot) -> None:
-    effects: list[Effect] = [
+    assert absorbed([in_proportion(0.0)]) == {}, "what does not show at all is not absorbed"
+    # Refinements, runs and chosen places are left out.
+    effects = [
         Armature((0,), {}, ("r1",)),
         NonlinearViscousFriction((0,), {"power": 2.0}),
         Spring((0,)),
     ]
-    assert ("armature", robot.joint_names[0]) not in absorbed(robot, effects)
-    assert absorbed(robot, [Armature((0,))], chosen=(0,)) == {}
+    assert ("armature", ROBOT.joint_names[0]) not in absorbed(effects)
+    assert absorbed([Armature((0,))], chosen=(0,)) == {}

@@ -17,8 +17,7 @@ from excite_cli.effects.base import Effect
 from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.torque_offset import TorqueOffset
 from excite_cli.effects.viscous_friction import ViscousFriction
-from tests.diagnosis.explicit_data import FIXED, prepared
-from tests.diagnosis.test_judgement import judge_of, planted
+from tests.diagnosis.explicit_data import FIXED, judge_of, on_joint_0, planted, prepared
 
 SAMPLES = 400
 NAMED, NEAR, FAR, ELSEWHERE, WIDE = range(5)
@@ -81,9 +80,32 @@ def test_a_nearly_collinear_candidate_is_an_alias_and_others_are_not() -> None:
     aliases = found(0.1)
     assert [alias.candidate for alias in aliases] == [NEAR]
     assert aliases[0].divergence <= 0.5 * SAMPLES * 0.01 * (1.2 * SIZE) ** 2
+    # Weak effects and inflated noise have more aliases.
+    away = 0.2  # KL is 7.7 for the size of one
+    assert found(away) == []
+    assert [a.candidate for a in found(away, inflation=8.0)] == [NEAR]
+    assert [a.candidate for a in found(away, size=0.35)] == [NEAR]
+    # Divergence is that of the two models. Against the brute force: what is left of the fitted
+    # signal on the other's column.
+    away = 0.05
+    _, candidates, white = case(away)
+    x, y = (candidates[i].columns[0][:, 0, 0] for i in (NAMED, NEAR))
+    theta = white.solve([NAMED])[FIXED]
+    signal = theta * x
+    left = signal - y * (y @ signal) / (y @ y)
+    losses = white.energy([NEAR]) - white.energy([NAMED])
+    expected = min(0.5 * left @ left, max(0.5 * losses, 0.0))
+    assert found(away)[0].divergence == pytest.approx(expected, rel=1e-6)
 
 
-def test_more_of_it_in_some_runs_is_no_other_name_of_it() -> None:
+def test_places_that_are_taken_or_vetoed_are_left_out() -> None:
+    _, candidates, white = case(0.05)
+    both = {candidates[NAMED].place, candidates[NEAR].place}
+    assert aliases_of(NAMED, [], both, candidates, white, 1.0, anything) == []
+    taken = {candidates[NAMED].place}
+    vetoed = aliases_of(NAMED, [], taken, candidates, white, 1.0, lambda rest, other: other != NEAR)
+    assert vetoed == []
+    # More of it in some runs is no other name of it.
     _, candidates, white = case(0.1)
     for kind, expected in ((CoulombFriction, []), (ViscousFriction, [NEAR])):
         pool = list(candidates)
@@ -96,35 +118,6 @@ def test_more_of_it_in_some_runs_is_no_other_name_of_it() -> None:
 @pytest.mark.parametrize("away", [0.35, 1.0])
 def test_a_candidate_at_an_angle_is_none(away: float) -> None:
     assert found(away) == []
-
-
-def test_divergence_is_that_of_the_two_models() -> None:
-    """Against the brute force: what is left of the fitted signal on the other's column."""
-    away = 0.05
-    _, candidates, white = case(away)
-    x, y = (candidates[i].columns[0][:, 0, 0] for i in (NAMED, NEAR))
-    theta = white.solve([NAMED])[FIXED]
-    signal = theta * x
-    left = signal - y * (y @ signal) / (y @ y)
-    losses = white.energy([NEAR]) - white.energy([NAMED])
-    expected = min(0.5 * left @ left, max(0.5 * losses, 0.0))
-    assert found(away)[0].divergence == pytest.approx(expected, rel=1e-6)
-
-
-def test_weak_effects_and_inflated_noise_have_more_aliases() -> None:
-    away = 0.2  # KL is 7.7 for the size of one
-    assert found(away) == []
-    assert [a.candidate for a in found(away, inflation=8.0)] == [NEAR]
-    assert [a.candidate for a in found(away, size=0.35)] == [NEAR]
-
-
-def test_places_that_are_taken_or_vetoed_are_left_out() -> None:
-    _, candidates, white = case(0.05)
-    both = {candidates[NAMED].place, candidates[NEAR].place}
-    assert aliases_of(NAMED, [], both, candidates, white, 1.0, anything) == []
-    taken = {candidates[NAMED].place}
-    vetoed = aliases_of(NAMED, [], taken, candidates, white, 1.0, lambda rest, other: other != NEAR)
-    assert vetoed == []
 
 
 def test_of_several_shapes_at_a_place_the_nearest_is_kept() -> None:
@@ -144,32 +137,22 @@ def test_of_several_shapes_at_a_place_the_nearest_is_kept() -> None:
     assert [alias.candidate for alias in aliases] == [best]
 
 
-def jointly(first: float, second: float, chosen: Sequence[int]) -> list:
-    """The first effect's column is the sum of those of the two others; all on joint 0."""
+SUM = [[1.0, 1.0, 0.0], [1.0, 0.0, 1.0]]  # the first effect's column is that of both others
+
+
+@pytest.mark.parametrize(
+    ("mix", "sizes", "chosen", "expected"),
+    [
+        (SUM, (3.0, 3.0), [0], [((0,), (1, 2))]),
+        (SUM, (3.0, 3.0), [1, 2], [((1, 2), (0,))]),
+        (SUM, (3.0, 1.0), [1, 2], []),  # of another ratio
+        ([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]], (3.0, 0.0), [0], []),  # one of the pair is enough
+        ([[1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]], (3.0, -3.0), [0], []),  # friction would be negative
+    ],
+)
+def test_two_together_may_stand_for_one_and_one_for_two(
+    mix: list[list[float]], sizes: Sequence[float], chosen: list[int], expected: list
+) -> None:
     effects = [TorqueOffset((0,)), Armature((0,)), ViscousFriction((0,))]
-    mix = np.array([[1.0, 1.0, 0.0], [1.0, 0.0, 1.0]])
-    torque = np.array([[first, 0.0], [second, 0.0]])
-    return joint_aliases(chosen, judge_of(*planted(effects, mix, torque)), chosen)
-
-
-def test_two_together_may_stand_for_one_and_one_for_two() -> None:
-    assert jointly(3.0, 3.0, [0]) == [((0,), (1, 2))]
-    assert jointly(3.0, 3.0, [1, 2]) == [((1, 2), (0,))]
-
-
-def test_one_of_another_ratio_does_not_stand_for_two() -> None:
-    assert jointly(3.0, 1.0, [1, 2]) == []
-
-
-def test_a_pair_is_not_told_where_one_of_it_is_enough() -> None:
-    effects = [TorqueOffset((0,)), Armature((0,)), ViscousFriction((0,))]
-    mix = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    judge = judge_of(*planted(effects, mix, np.array([[3.0, 0.0], [0.0, 0.0]])))
-    assert joint_aliases([0], judge, [0]) == []
-
-
-def test_a_vetoed_pair_stands_for_nothing() -> None:
-    effects = [TorqueOffset((0,)), Armature((0,)), ViscousFriction((0,))]
-    mix = np.array([[1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])  # the friction would be negative
-    judge = judge_of(*planted(effects, mix, np.array([[3.0, 0.0], [-3.0, 0.0]])))
-    assert joint_aliases([0], judge, [0]) == []
+    judge = judge_of(*planted(effects, on_joint_0(sizes), np.array(mix)))
+    assert joint_aliases(chosen, judge, chosen) == expected

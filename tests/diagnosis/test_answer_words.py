@@ -21,11 +21,7 @@ from tests.diagnosis.synthetic_diagnosis import make_diagnosis
 
 SPRING = {"stiffness": Value(6912.0, 30.0, "N·m/rad"), "preload": Value(10.0, 1.0, "N·m")}
 RUBS = {"coulomb": Value(2.0, 0.1, "N·m")}
-
-
-@pytest.fixture(scope="module")
-def plain() -> Diagnosis:
-    return make_diagnosis()
+PLAIN = make_diagnosis()
 
 
 def effect(
@@ -37,32 +33,32 @@ def effect(
     )
 
 
-def found(plain: Diagnosis, *effects: NamedEffect, left: tuple[float, float] = (0.02, 0.1),
-          **changes: Any) -> Diagnosis:  # fmt: skip
+def found(
+    *effects: NamedEffect, left: tuple[float, float] = (0.02, 0.1), **changes: Any
+) -> Diagnosis:
     """Errors fall from 50 % to those `left` on the elbow and on the slide."""
-    names = plain.joint_names
+    names = PLAIN.joint_names
     after = dict.fromkeys(names, left[0]) | {"slide": left[1]}
     mean = sum(after.values()) / len(names)
     before = replace(
-        plain.before, mean_relative=0.6, mean_relative_moving=0.5,
+        PLAIN.before, mean_relative=0.6, mean_relative_moving=0.5,
         relative_moving=dict.fromkeys(names, 0.5),
     )  # fmt: skip
-    end = replace(plain.after, mean_relative=mean, mean_relative_moving=mean, relative_moving=after)
-    return replace(plain, effects=effects, before=before, after=end, large_rests=(), **changes)
+    end = replace(PLAIN.after, mean_relative=mean, mean_relative_moving=mean, relative_moving=after)
+    return replace(PLAIN, effects=effects, before=before, after=end, large_rests=(), **changes)
 
 
-def everywhere(plain: Diagnosis, part: float) -> dict[str, float]:
-    return dict.fromkeys(plain.joint_names, part)
+def everywhere(part: float) -> dict[str, float]:
+    return dict.fromkeys(PLAIN.joint_names, part)
 
 
-def test_friction_is_one_share_and_the_rest_is_told_by_place(plain: Diagnosis) -> None:
+def test_friction_is_one_share_and_the_rest_is_told_by_place() -> None:
     line = FrictionLine("elbow", Value(3.0, 0.1, "N·m·s/rad"), Value(45.0, 0.1, "N·m"), curved=True)
     answer = found(
-        plain,
-        effect("coulomb_friction", "elbow", RUBS, everywhere(plain, 0.2)),
-        effect("coupled_friction", "elbow", RUBS, everywhere(plain, 0.1)),
-        effect("spring", "shoulder_pitch", SPRING, everywhere(plain, 0.1)),
-        effect("armature", "elbow", {"inertia": Value(0.1, 0.01, "kg·m²")}, everywhere(plain, 0.0)),
+        effect("coulomb_friction", "elbow", RUBS, everywhere(0.2)),
+        effect("coupled_friction", "elbow", RUBS, everywhere(0.1)),
+        effect("spring", "shoulder_pitch", SPRING, everywhere(0.1)),
+        effect("armature", "elbow", {"inertia": Value(0.1, 0.01, "kg·m²")}, everywhere(0.0)),
         friction_lines=(line,),
     )
     assert shares(answer) == pytest.approx({"friction": 0.75, "spring": 0.25, "armature": 0.0})
@@ -75,15 +71,15 @@ def test_friction_is_one_share_and_the_rest_is_told_by_place(plain: Diagnosis) -
     )
 
 
-def test_names_that_fit_as_well_are_to_be_told_apart_next(plain: Diagnosis) -> None:
+def test_names_that_fit_as_well_are_to_be_told_apart_next() -> None:
     more, less = (
-        effect("spring", joint, SPRING, everywhere(plain, part))
+        effect("spring", joint, SPRING, everywhere(part))
         for joint, part in (("elbow", 0.3), ("slide", 0.1))
     )
     armature = EffectRecord("armature", ("elbow",), {}, (1.0,))
     drag = EffectRecord("nonlinear_viscous_friction", ("slide",), {}, (1.0,))
     told = answer_in_words(
-        found(plain, replace(less, aliases=(drag,)), replace(more, aliases=(armature,)))
+        found(replace(less, aliases=(drag,)), replace(more, aliases=(armature,)))
     )
     assert told.endswith(
         " Next: a motion that distinguishes spring at the joint of elbow from inertia of the motor "
@@ -91,18 +87,16 @@ def test_names_that_fit_as_well_are_to_be_told_apart_next(plain: Diagnosis) -> N
     )
 
 
-def test_one_effect_is_told_by_its_name(plain: Diagnosis) -> None:
-    answer = found(plain, effect("load_dependent_friction", "elbow", RUBS, everywhere(plain, 0.4)))
+def test_one_effect_is_told_by_its_name_and_the_rest_by_what_it_depends_on() -> None:
+    answer = found(effect("load_dependent_friction", "elbow", RUBS, everywhere(0.4)))
     assert answer_in_words(answer).startswith(
         "Load-dependent friction of elbow (2 N·m) accounts for nearly all of the unmodelled "
         "torque. "
     )
-
-
-def test_what_stays_is_told_with_what_it_depends_on(plain: Diagnosis) -> None:
+    # What stays is told with what it depends on.
     of = (Covariate("position", "elbow", Aspect.HISTORY), Covariate("time"))
-    rest = replace(plain.large_rests[0], depends_on=of)
-    answer = found(plain, effect("coulomb_friction", "elbow", RUBS, everywhere(plain, 0.4)),
+    rest = replace(PLAIN.large_rests[0], depends_on=of)
+    answer = found(effect("coulomb_friction", "elbow", RUBS, everywhere(0.4)),
                    left=(0.1, 0.1))  # fmt: skip
     told = answer_in_words(replace(answer, large_rests=(rest,)))
     assert (
@@ -111,35 +105,31 @@ def test_what_stays_is_told_with_what_it_depends_on(plain: Diagnosis) -> None:
     ) in told
 
 
-def test_a_fit_of_kept_inertias_has_its_share(plain: Diagnosis) -> None:
-    spring = effect("spring", "elbow", SPRING, everywhere(plain, 0.3))
-    begin = found(plain, spring)
+def test_a_fit_of_kept_inertias_has_its_share() -> None:
+    spring = effect("spring", "elbow", SPRING, everywhere(0.3))
+    begin = found(spring)
     answer = replace(
-        begin, untouched=begin.before, inertia_parts=everywhere(plain, 0.1)
+        begin, untouched=begin.before, inertia_parts=everywhere(0.1)
     )  # fmt: skip
     assert shares(answer) == pytest.approx({"spring": 0.75, "inertias": 0.25})
     assert "Inertias that differ from the URDF account for 25%." in answer_in_words(answer)
 
 
-def test_nothing_and_nothing_good(plain: Diagnosis) -> None:
-    assert answer_in_words(found(plain)).startswith("Nothing is missing: ")
-    some = replace(found(plain), large_rests=plain.large_rests)
+def test_nothing_and_nothing_good() -> None:
+    assert answer_in_words(found()).startswith("Nothing is missing: ")
+    some = replace(found(), large_rests=PLAIN.large_rests)
     assert answer_in_words(some).startswith("No effect of the catalogue explains the residual")
-    worse = found(
-        plain, effect("spring", "elbow", SPRING, everywhere(plain, -0.1)), left=(0.7, 0.7)
-    )
+    worse = found(effect("spring", "elbow", SPRING, everywhere(-0.1)), left=(0.7, 0.7))
     assert answer_in_words(worse).startswith("The held-out error did not fall: ")
     assert shares(worse) == {}
+    # Files of earlier versions know no parts.
+    assert shares(PLAIN) == {}
+    assert answer_in_words(PLAIN).startswith("Your model lacks 1 effect, none of them large.")
 
 
-def test_files_of_earlier_versions_know_no_parts(plain: Diagnosis) -> None:
-    assert shares(plain) == {}
-    assert answer_in_words(plain).startswith("Your model lacks 1 effect, none of them large.")
-
-
-def test_what_lowers_nothing_is_told_so_with_the_warnings(plain: Diagnosis) -> None:
-    spring = effect("spring", "elbow", SPRING, everywhere(plain, -0.01))
-    vain = found(plain, spring, left=(0.51, 0.51), findings=())
+def test_what_lowers_nothing_is_told_so_with_the_warnings() -> None:
+    spring = effect("spring", "elbow", SPRING, everywhere(-0.01))
+    vain = found(spring, left=(0.51, 0.51), findings=())
     assert answer_in_words(vain).startswith(
         "Adding 1 effect does not lower the error where joints move (50% before)."
     )
@@ -148,18 +138,18 @@ def test_what_lowers_nothing_is_told_so_with_the_warnings(plain: Diagnosis) -> N
     told = "Next: resolve 1 warning about the data."
     assert answer_in_words(warned).endswith(told)
     carried = replace(spring, effect=replace(spring.effect, runs=("motion_1",)))
-    assert "does not lower" not in answer_in_words(found(plain, carried, left=(0.51, 0.51)))
+    assert "does not lower" not in answer_in_words(found(carried, left=(0.51, 0.51)))
 
 
-def test_what_rests_on_a_weight_is_told_whatever_the_error_does(plain: Diagnosis) -> None:
+def test_what_rests_on_a_weight_is_told_whatever_the_error_does() -> None:
     """And what no motion tells it from, if there is nothing for a motion to tell."""
     size = {"gain": Value(0.04, 0.001, "1")}
     offset = EffectRecord("torque_offset", ("slide",), {}, (1.0,))
     gain = replace(
-        effect("torque_gain", "elbow", size, everywhere(plain, -1e-3)),
+        effect("torque_gain", "elbow", size, everywhere(-1e-3)),
         verdict=HeldOutVerdict.WEIGHED,
     )
-    whole = found(plain, gain)
+    whole = found(gain)
     lower = whole.after.mean_relative_moving - 1e-4
     same = replace(whole, before=replace(whole.after, mean_relative_moving=lower))
     assert answer_in_words(same).startswith(
@@ -174,8 +164,8 @@ def test_what_rests_on_a_weight_is_told_whatever_the_error_does(plain: Diagnosis
         "gain of the measured torque of elbow from offset of the measured torque of slide; no "
         "motion does."
     )
-    spring = replace(effect("spring", "elbow", SPRING, everywhere(plain, 0.1)), aliases=(offset,))
-    first = replace(rival, parts=everywhere(plain, 0.2))
-    told = answer_in_words(found(plain, first, spring))
+    spring = replace(effect("spring", "elbow", SPRING, everywhere(0.1)), aliases=(offset,))
+    first = replace(rival, parts=everywhere(0.2))
+    told = answer_in_words(found(first, spring))
     assert " Next: a motion that distinguishes spring at the joint of elbow from offset" in told
     assert "given the known mass. On elbow: spring at the joint (6.9 kN·m/rad" in told

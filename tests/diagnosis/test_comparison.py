@@ -13,11 +13,16 @@ from excite_cli.diagnosis.sufficient import sufficient
 from excite_cli.diagnosis.textbook import everyday, textbook
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect
-from excite_cli.effects.catalogue import catalogue
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array
-from tests.diagnosis.explicit_data import FOLDS, prepared, usual_of_unit_columns
-from tests.diagnosis.test_misspecification import planted, traced
+from tests.diagnosis.explicit_data import (
+    FOLDS,
+    effect,
+    planted,
+    prepared,
+    traced,
+    usual_of_unit_columns,
+)
 
 SAMPLES = 400
 FIXED = 3
@@ -57,10 +62,6 @@ def models_of(given: SearchResult) -> Comparison:
     return Comparison(given.data, given.candidates, every, given.levels)
 
 
-def effect(kind: str, runs: tuple[str, ...] = ()) -> Effect:
-    return catalogue()[kind]((0,), {}, runs)
-
-
 def everyday_traced(
     offset: float, armature: float, spring: float = 0.0, friction: float = 1.0
 ) -> SearchResult:
@@ -84,13 +85,21 @@ def test_by_how_much_a_model_is_better_and_how_surely() -> None:
     assert found.better
     assert models.difference([0], []).size < 0.0
     assert not models.difference([0], [0, 1]).better
+    # A name is missed more surely than a model is better.
+    assert models.missed([0, 1], [1], (0,))
+    assert not models.missed([0, 1], [0], (0,))
 
 
 def test_what_one_run_shows_is_not_in_a_new_recording() -> None:
-    given = traced_of([(effect("payload", ("b",)), 0.5), (effect("armature"), 0.2)])
+    given = traced_of([(replace(effect("payload"), runs=("b",)), 0.5), (effect("armature"), 0.2)])
     models = models_of(given)
     assert models.difference([], [0]).size < 1.0
     assert models.difference([], [1]).of_error > 0.0
+    # Of few recordings too. Every block takes the joint through all of its travel: the others know
+    # what is in it.
+    q = np.tile(np.linspace(0.0, 1.0, 50), len(FOLDS) * SAMPLES // 50)
+    q += np.random.default_rng(0).normal(size=len(q))
+    assert models_of(alone(given, q)).difference([], [0]).better
 
 
 def alone(given: SearchResult, q: Array) -> SearchResult:
@@ -105,18 +114,10 @@ def test_of_one_recording_a_quarter_of_the_travel_is_predicted_by_the_rest(
     everywhere: bool,
 ) -> None:
     """What shows in one part of it only is not known to be there elsewhere."""
-    given = traced_of([(effect("payload", () if everywhere else ("b",)), 0.5)])
+    given = traced_of([(replace(effect("payload"), runs=() if everywhere else ("b",)), 0.5)])
     q = np.linspace(0.0, 1.0, len(FOLDS) * SAMPLES)
     found = models_of(alone(given, q)).difference([], [0])
     assert found.better if everywhere else found.size < 1.0
-
-
-def test_of_few_recordings_too() -> None:
-    """Every block takes the joint through all of its travel: the others know what is in it."""
-    given = traced_of([(effect("payload", ("b",)), 0.5), (effect("armature"), 0.2)])
-    q = np.tile(np.linspace(0.0, 1.0, 50), len(FOLDS) * SAMPLES // 50)
-    q += np.random.default_rng(0).normal(size=len(q))
-    assert models_of(alone(given, q)).difference([], [0]).better
 
 
 @pytest.mark.parametrize(
@@ -141,9 +142,7 @@ def test_what_was_found_is_the_answer_with_what_every_robot_has() -> None:
     """Not with an armature that is surely next to nothing."""
     assert chosen(everyday_traced(0.0, 0.5, 0.5), [4]) == {0, 1, 3, 4}
     assert chosen(everyday_traced(0.0, 0.0, 0.5, friction=10.0), [4]) == {0, 1, 4}
-
-
-def test_the_textbook_is_the_answer_where_nothing_beats_it() -> None:
+    # The textbook is the answer where nothing beats it.
     given = everyday_traced(0.5, 0.5)
     assert chosen(given, [0, 4]) == {0, 1, 2, 3}
     assert chosen(everyday_traced(0.0, 0.0), [0, 1]) == {0, 1}  # it is that
@@ -152,18 +151,11 @@ def test_the_textbook_is_the_answer_where_nothing_beats_it() -> None:
 @pytest.mark.parametrize(("second", "missed"), [(0.0, False), (1.0, True)])
 def test_what_acts_on_two_joints_must_be_missed_on_both(second: float, missed: bool) -> None:
     """Of one of them alone half of it predicts both together better, and it is another effect."""
-    data, candidates = planted([catalogue()["viscous_friction"]((0, 1))], np.array([[1.0, second]]))
+    data, candidates = planted([effect("viscous_friction", 0, 1)], np.array([[1.0, second]]))
     given = replace(traced(data, candidates, [0]), usual=usual_of_unit_columns(2, 0))
     models = models_of(given)
     assert models.difference([], [0]).better
     assert models.missed([0], [], (0, 1)) is missed
-
-
-def test_a_name_is_missed_more_surely_than_a_model_is_better() -> None:
-    given = traced_of([(effect("viscous_friction"), 0.5), (effect("armature"), 0.0)])
-    models = models_of(given)
-    assert models.missed([0, 1], [1], (0,))
-    assert not models.missed([0, 1], [0], (0,))
 
 
 def test_one_recording_asks_for_more() -> None:

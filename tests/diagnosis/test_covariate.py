@@ -31,19 +31,22 @@ def test_another_text_is_none(code: str) -> None:
         Covariate.of_code(code)
 
 
-def test_what_each_joint_has_of_its_own_loses_its_name() -> None:
-    load = Covariate("load", "elbow")
-    assert load.common == Covariate("load", own=True)
-    past = Covariate("position", "elbow", Aspect.HISTORY)
-    assert past.common == Covariate("position", "", Aspect.HISTORY, own=True)
-    column = Covariate("covariate", "temp", Aspect.DIRECTION)
-    assert column.common == column
-    angle = Covariate("position", "elbow")
-    assert angle.common == angle
-
-
-def test_hysteresis_of_motion_is_like_friction() -> None:
-    assert Covariate("position", "elbow", Aspect.HISTORY).like == "speed"
-    assert Covariate("position", "elbow", Aspect.DIRECTION).like == "speed"
-    assert Covariate("position", "elbow").like == "position"
+@pytest.mark.parametrize(
+    ("of", "common", "like"),
+    [
+        (Covariate("load", "elbow"), Covariate("load", own=True), "load"),
+        (
+            Covariate("position", "elbow", Aspect.HISTORY),  # hysteresis is like friction
+            Covariate("position", "", Aspect.HISTORY, own=True),
+            "speed",
+        ),
+        (Covariate("covariate", "temp", Aspect.DIRECTION), None, None),
+        (Covariate("position", "elbow"), None, "position"),
+    ],
+)
+def test_what_each_joint_has_of_its_own_loses_its_name(
+    of: Covariate, common: Covariate | None, like: str | None
+) -> None:
+    assert of.common == (common or of)
+    assert like in (None, of.like)
     assert Covariate("load", "elbow", Aspect.HISTORY).like == "load"

@@ -75,9 +75,7 @@ def test_it_is_the_fit_of_a_line_to_all_friction_declared_and_found(robot: Robot
     slides = bool(robot.sliding[1])
     assert curved.viscous.unit == ("N·s/m" if slides else "N·m·s/rad")
     assert curved.coulomb.unit == ("N" if slides else "N·m")
-
-
-def test_friction_of_single_runs_is_no_plain_line(robot: Robot) -> None:
+    # Friction of single runs is no plain line.
     alone = CoulombFriction((1,), {}, ("of_another",))
     (line,), *_ = lines(robot, [CoulombFriction((1,))], [alone], [2.0, 5.0])
     assert line.curved

@@ -44,20 +44,16 @@ def test_the_parts_of_a_joint_add_up(who: tuple[int, ...]) -> None:
     assert sum(parts.values()) == pytest.approx(fall, abs=1e-12)
 
 
-def test_a_part_is_the_mean_over_orders() -> None:
+def test_a_part_is_the_mean_over_orders_and_what_is_refined_joins_first() -> None:
     errors = made_up((0, 1), seed=3)
+    first, last = errors.of(()) - errors.of((0,)), errors.of((1,)) - errors.of((0, 1))
     found = error_parts(traced(2), errors)[0]
-    alone, beside = errors.of(()) - errors.of((0,)), errors.of((1,)) - errors.of((0, 1))
     # A hundred draws: as often first as last, within four deviations.
-    assert found == pytest.approx((alone + beside) / 2, abs=float(np.ptp([alone, beside])) * 0.2)
-    assert not np.allclose(found, alone)
-
-
-def test_what_is_refined_joins_first() -> None:
-    errors = made_up((0, 1))
-    found = error_parts(traced(2, {0: (1,)}), errors)
-    assert found[1] == pytest.approx(errors.of(()) - errors.of((1,)))
-    assert found[0] == pytest.approx(errors.of((1,)) - errors.of((0, 1)))
+    assert found == pytest.approx((first + last) / 2, abs=float(np.ptp([first, last])) * 0.2)
+    assert not np.allclose(found, first)
+    refined = error_parts(traced(2, {0: (1,)}), errors)
+    assert refined[1] == pytest.approx(errors.of(()) - errors.of((1,)))
+    assert refined[0] == pytest.approx(last)
     both = error_parts(traced(2, {0: (1,), 1: (0,)}), errors)  # each refines the other
     assert sum(both.values()) == pytest.approx(errors.of(()) - errors.of((0, 1)))
 

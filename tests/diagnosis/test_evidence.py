@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.evidence import Evidence
+from excite_cli.diagnosis.evidence import Evidence, Grams, JointGram
 from excite_cli.diagnosis.noise_model import NoiseModel
-from excite_cli.diagnosis.schur import ABSORBED
+from excite_cli.diagnosis.schur import ABSORBED, Cholesky
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.armature import Armature
 from excite_cli.effects.torque_gain import TorqueGain
 from excite_cli.robot.model import Array
 from tests.diagnosis.explicit_data import (
     FIXED,
+    FOLDS,
     NOTHING,
     PRIOR,
     WEIGHED,
@@ -49,10 +50,29 @@ def test_parameters_and_energies(both: tuple[Evidence, Rows], chosen: tuple[int,
     assert evidence.energy_on(chosen, None) == pytest.approx(rows.energy(chosen), rel=1e-8)
 
 
-def test_an_effect_of_one_fold_is_there_in_it_alone(both: tuple[Evidence, Rows]) -> None:
+def test_covariance_is_the_inverse_of_the_normal_matrix(both: tuple[Evidence, Rows]) -> None:
+    """And gains of several and of pairs are what the residual loses."""
+    evidence, rows = both
+    chosen = (0, 3)
+    x = rows.x[:, rows.columns(chosen)]
+    normal = x.T @ x
+    normal[:FIXED, :FIXED] += rows.known[:, :-1].T @ rows.known[:, :-1]
+    assert evidence.covariance(chosen) == pytest.approx(np.linalg.inv(normal), rel=1e-6, abs=1e-12)
+    # An effect of one fold is there in it alone.
     evidence, _ = both
     assert evidence.folds_of([4]).tolist() == [False, True, False]
     assert evidence.folds_of([0, 4]).all()
+    # Gains of several and of pairs.
+    evidence, rows = both
+    schur = evidence.schur((2,))
+    before = rows.energy((2,), with_known=True)
+    pairs = [(0, 1), (0, 3), (1, 3), (3, 4), (0, 4)]
+    found = schur.pair_chi2(*np.array(pairs).T)
+    for pair, value in zip(pairs, found, strict=True):
+        expected = before - rows.energy([2, *pair], with_known=True)
+        assert value == pytest.approx(expected, rel=1e-6)
+        together = schur.gain(*pair)
+        assert (together.chi2, together.dof) == (pytest.approx(expected, rel=1e-6), 2)
 
 
 @pytest.mark.parametrize("chosen", CHOSEN)
@@ -61,7 +81,7 @@ def test_errors_on_blocks_fitted_to_the_others(
 ) -> None:
     evidence, rows = both
     sides = evidence.in_turn.energies(chosen)
-    assert sides.ravel() == pytest.approx(rows.on_blocks(chosen, new=False).ravel(), rel=1e-6)
+    assert sides.ravel() == pytest.approx(rows.on_blocks(chosen).ravel(), rel=1e-6)
     assert evidence.in_turn.energies(chosen, [1]) == pytest.approx(sides[1:], rel=1e-9)
     for joint in (0, 1):
         whole = evidence.seen.energies(chosen)[joint, 0]
@@ -72,10 +92,18 @@ def test_errors_on_blocks_fitted_to_the_others(
 def test_blocks_say_at_once_what_a_model_is_without_each_member(
     both: tuple[Evidence, Rows], chosen: tuple[int, ...]
 ) -> None:
+    """Which is a downdate of the whole model's fit away."""
     evidence, _ = both
     for blocks in (evidence.in_turn, evidence.seen):
         for member, energies in blocks.without_each(chosen).items():
-            rest = [i for i in chosen if i != member]
+            rest = tuple(sorted(i for i in chosen if i != member))
+            expected = blocks._anew(rest)
+            blocks._fitted.clear()
+            blocks.fit(chosen)
+            found = blocks._fits(rest)
+            assert not found.exact
+            assert found.at.tolist() == expected.at.tolist()
+            assert found.parameters == pytest.approx(expected.parameters, rel=1e-6, abs=1e-9)
             assert energies == pytest.approx(blocks.energies(rest), rel=1e-6)
 
 
@@ -90,23 +118,6 @@ def test_blocks_say_at_once_what_a_model_is_with_each_of_others(
         for other, energies in blocks.with_each(chosen, others, joints).items():
             more = [*chosen, other]
             assert energies == pytest.approx(blocks.energies(more, joints), rel=1e-6)
-
-
-@pytest.mark.parametrize("chosen", [c for c in CHOSEN if c])
-def test_a_model_of_blocks_without_one_is_a_downdate_away(
-    both: tuple[Evidence, Rows], chosen: tuple[int, ...]
-) -> None:
-    evidence, _ = both
-    for blocks in (evidence.in_turn, evidence.seen):
-        for member in chosen:
-            rest = tuple(sorted(i for i in chosen if i != member))
-            expected = blocks._anew(rest)
-            blocks._fitted.clear()
-            blocks.fit(chosen)
-            found = blocks._fits(rest)
-            assert not found.exact
-            assert found.at.tolist() == expected.at.tolist()
-            assert found.parameters == pytest.approx(expected.parameters, rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.parametrize("chosen", [c for c in CHOSEN if c])
@@ -189,28 +200,6 @@ def test_what_a_member_adds_is_what_the_others_lose_with_it(
         assert (gain.dof, gain.left) == (explicit.dof, pytest.approx(explicit.left, rel=1e-6))
 
 
-def test_gains_of_several_and_of_pairs(both: tuple[Evidence, Rows]) -> None:
-    evidence, rows = both
-    schur = evidence.schur((2,))
-    before = rows.energy((2,), with_known=True)
-    pairs = [(0, 1), (0, 3), (1, 3), (3, 4), (0, 4)]
-    found = schur.pair_chi2(*np.array(pairs).T)
-    for pair, value in zip(pairs, found, strict=True):
-        expected = before - rows.energy([2, *pair], with_known=True)
-        assert value == pytest.approx(expected, rel=1e-6)
-        together = schur.gain(*pair)
-        assert (together.chi2, together.dof) == (pytest.approx(expected, rel=1e-6), 2)
-
-
-def test_covariance_is_the_inverse_of_the_normal_matrix(both: tuple[Evidence, Rows]) -> None:
-    evidence, rows = both
-    chosen = (0, 3)
-    x = rows.x[:, rows.columns(chosen)]
-    normal = x.T @ x
-    normal[:FIXED, :FIXED] += rows.known[:, :-1].T @ rows.known[:, :-1]
-    assert evidence.covariance(chosen) == pytest.approx(np.linalg.inv(normal), rel=1e-6, abs=1e-12)
-
-
 def test_what_the_model_holds_already_gains_nothing() -> None:
     """A copy of a declared column, a combination of two candidates, and a column of zeros."""
     data = random_data(5)
@@ -243,9 +232,7 @@ def test_collinear_pairs_gain_nothing_together() -> None:
     assert schur.pair_chi2(np.array([0]), np.array([2]))[0] > 0.0
     assert schur.gain(0, 1).dof == 1
     assert schur.gain(0, 1).chi2 == pytest.approx(schur.gain(0).chi2, rel=1e-4)
-
-
-def test_a_two_column_candidate_with_one_column_absorbed_has_one_left() -> None:
+    # A two column candidate with one column absorbed has one left.
     data = random_data(8)
     candidates = random_candidates(8)
     two = candidates[2]
@@ -270,19 +257,6 @@ def test_rows_that_are_not_usable_do_not_count() -> None:
         one = data.evidence(candidates, noise)
         other = replace(data, tau=wild).evidence(candidates, noise)
         assert np.array_equal(one.grams.total(), other.grams.total())
-
-
-def test_residuals_are_the_torque_less_the_model() -> None:
-    data, candidates = random_data(4), random_candidates(4)
-    chosen = (3, 2)
-    theta = np.random.default_rng(0).normal(size=FIXED + 3)
-    found = data.residuals(candidates, chosen, theta)
-    for part, rest in enumerate(found):
-        expected = data.tau[part] - data.declared[part] @ theta[:FIXED]
-        expected = expected - candidates[3].columns[part][:, :, 0] * theta[FIXED]
-        expected[:, 0] -= candidates[2].columns[part][:, 0] @ theta[FIXED + 1 :]
-        assert rest == pytest.approx(expected)
-    assert np.array_equal(data.tau[0], random_data(4).tau[0])  # untouched
 
 
 GAIN, INERTIAS = 0.04, np.array([5.0, -3.0, 20.0, 8.0])
@@ -327,10 +301,83 @@ def test_without_weight_a_gain_is_absorbed_and_beside_itself_it_is_not_told_agai
     assert not free.schur(()).identified_by_prior_only(0)
     assert not kept.schur(()).identified_by_prior_only(0)
     assert not data.evidence([gain, gain], WHITE).schur((0,)).identified_by_prior_only(1)
-
-
-def test_data_that_tell_an_effect_themselves_are_not_said_to_need_a_weight() -> None:
-    data, gain, _ = of_a_wrong_scale(0.3)
-    (other, *_) = random_candidates(4)
-    schur = data.evidence([gain, other], WHITE).schur(())
+    # Data that tell an effect themselves are not said to need a weight.
+    schur = data.evidence([gain, random_candidates(4)[0]], WHITE).schur(())
     assert [schur.identified_by_prior_only(i) for i in (0, 1)] == [True, False]
+
+
+SIZE = 7
+
+
+@pytest.fixture
+def grams_and_full() -> tuple[Grams, np.ndarray]:
+    """And in full, (F, 2, n, K, K)."""
+    rng = np.random.default_rng(4)
+    full = np.zeros((3, 2, 3, SIZE, SIZE))
+    joints = []
+    for j, active in enumerate(([0, 1, 2], [0, 1, 4, 5], [0, 1])):
+        own = rng.normal(size=(3, 2, len(active) + 1, len(active) + 1))
+        at = np.array([*active, SIZE - 1])
+        full[:, :, j, at[:, None], at] = own
+        joints.append(JointGram(np.array(active), own.reshape(-1, *own.shape[2:])))
+    return Grams(joints, SIZE), full
+
+
+def test_sums_over_folds_and_joints(grams_and_full: tuple[Grams, np.ndarray]) -> None:
+    grams, full = grams_and_full
+    assert grams.total() == pytest.approx(full.sum(axis=(0, 1, 2)))
+    assert grams.seen() == pytest.approx(np.einsum("fsjkk->fsk", full).reshape(-1, SIZE))
+    assert grams.torque_energy(1) == pytest.approx(full[:, :, 1, -1, -1].sum())
+
+
+@pytest.mark.parametrize("size", [1, 2, 30])
+def test_one_and_many_right_sides(size: int) -> None:
+    rng = np.random.default_rng(size)
+    rows = rng.normal(size=(2 * size, size))
+    matrix, rhs = rows.T @ rows, rng.normal(size=(size, 3))
+    kept = matrix.copy(), rhs.copy()
+    factor = Cholesky(matrix)
+    assert factor.solve(rhs) == pytest.approx(np.linalg.solve(matrix, rhs), rel=1e-8)
+    assert factor.solve(rhs[:, 0]) == pytest.approx(np.linalg.solve(matrix, rhs[:, 0]), rel=1e-8)
+    assert np.array_equal(matrix, kept[0])
+    assert np.array_equal(rhs, kept[1])
+
+
+def test_what_is_not_positive_definite_has_no_factor() -> None:
+    with pytest.raises(np.linalg.LinAlgError, match="column 2 of 3"):
+        Cholesky(np.diag([1.0, -1.0, 1.0]))
+
+
+@pytest.mark.parametrize("chosen", [(), (0,), (2,), (1, 3), (3, 2, 0), (4, 1)])
+@pytest.mark.parametrize("joint", [0, 1])
+def test_columns_times_parameters_are_the_model_of_that_joint(
+    chosen: tuple[int, ...], joint: int
+) -> None:
+    """Against torque added up effect by effect, sample by sample."""
+    data, candidates = random_data(11), random_candidates(11)
+    widths = [candidates[i].width for i in chosen]
+    theta = np.random.default_rng(0).normal(size=FIXED + sum(widths))
+    starts = FIXED + np.cumsum([0, *widths])
+    for part in range(len(FOLDS)):
+        found = data.columns(candidates, chosen, part, joint)
+        assert found.shape == (len(data.tau[part]), FIXED + sum(widths))
+        for t in range(0, len(data.tau[part]), 7):
+            expected = float(data.declared[part][t, joint] @ theta[:FIXED])
+            for i, start in zip(chosen, starts, strict=False):
+                own = candidates[i]
+                values = theta[start : start + own.width]
+                for row, acts_on in enumerate(own.rows):
+                    if acts_on == joint:
+                        expected += float(own.columns[part][t, row] @ values)
+            assert found[t] @ theta == pytest.approx(expected)
+
+
+def test_columns_and_residuals_say_the_same() -> None:
+    data, candidates = random_data(12), random_candidates(12)
+    chosen = (3, 2, 1)
+    theta = np.random.default_rng(1).normal(size=FIXED + 4)
+    for part, rest in enumerate(data.residuals(candidates, chosen, theta)):
+        assert np.array_equal(data.tau[part], random_data(12).tau[part]), "untouched"
+        for joint in range(data.n):
+            model = data.columns(candidates, chosen, part, joint) @ theta
+            assert rest[:, joint] == pytest.approx(data.tau[part][:, joint] - model)

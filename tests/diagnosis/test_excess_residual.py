@@ -72,20 +72,16 @@ def left(
     return large_rests(traced, predicted, residuals, recorded, PROCESSING, floor)[0]
 
 
-def test_nothing_is_said_of_noise() -> None:
+def test_what_is_left_beside_the_noise_is_said() -> None:
     assert left(0.0) == ()
-
-
-def test_an_unknown_map_is_said_with_its_two_quantities() -> None:
+    # An unknown map is said with its two quantities.
     (rest,) = left(2.0)
     assert (rest.joint, rest.certain, rest.basis) == ("a", True, "band")
     assert {each.code for each in rest.depends_on} == {"q[a]", "q[b]"}
     assert rest.noise is not None
     assert rest.rms > 2.5 * rest.noise
     assert rest.predictable > 0.6
-
-
-def test_what_no_quantity_predicts_is_said_all_the_same() -> None:
+    # What no quantity predicts is said all the same.
     (rest,) = left(0.0, slow=2.0)
     assert (rest.joint, rest.certain, rest.depends_on) == ("b", True, ())
 
@@ -95,9 +91,7 @@ def test_repeated_periods_know_the_noise_best() -> None:
     (rest,) = left(0.0, floor=known)
     assert (rest.joint, rest.basis, rest.noise) == ("b", "periods", 0.01)
     assert rest.certain
-
-
-def test_noise_of_unknown_size_is_no_certainty() -> None:
+    # Noise of unknown size is no certainty.
     found = left(0.0, filtered=True)
     assert [each.joint for each in found] == ["a", "b"]
     assert all(each.noise is None and not each.certain for each in found)

@@ -15,36 +15,32 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.effects.seen import Seen
-from excite_cli.robot.model import Array, Robot, build_robot
+from excite_cli.robot.model import Array, build_robot
 from tests.diagnosis.explicit_data import prepared
 from tests.effects.motions import signals_at
 
 SAMPLES, STEP = 1000, 0.02
 SLOW, FAST = 0.02, 2.0  # rad/s
 TORQUE = 3.0  # N·m
+ROBOT = build_robot(RobotSpec(urdf="example-robot-data:ur5"))
 
 
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return build_robot(RobotSpec(urdf="example-robot-data:ur5"))
-
-
-def crept(robot: Robot, fastest: float) -> Signals:
+def crept(fastest: float) -> Signals:
     """Sines of this speed about the middle of every joint's range."""
     t = STEP * np.arange(SAMPLES)
-    w = np.linspace(0.7, 1.3, robot.n) * 2.0
+    w = np.linspace(0.7, 1.3, ROBOT.n) * 2.0
     wt = t[:, None] * w
     return signals_at(
-        robot, t, fastest / w * np.sin(wt), fastest * np.cos(wt), -fastest * w * np.sin(wt)
+        ROBOT, t, fastest / w * np.sin(wt), fastest * np.cos(wt), -fastest * w * np.sin(wt)
     )
 
 
-def usual(robot: Robot, seen: Signals) -> UsualMotion:
-    return UsualMotion(robot, standard_parameters(robot), [seen])
+def usual(seen: Signals) -> UsualMotion:
+    return UsualMotion(ROBOT, standard_parameters(ROBOT), [seen])
 
 
 def made(
-    robot: Robot, seen: Signals, effects: Sequence[Effect], tau: Array
+    seen: Signals, effects: Sequence[Effect], tau: Array
 ) -> tuple[TrainingData, list[Candidate]]:
     run = prepared(np.ones(tau.shape, bool), seen.q, seen.v, tau)
     data = TrainingData((run,), (0,), (np.zeros((*tau.shape, 0)),), (tau,))
@@ -55,33 +51,31 @@ def kind(name: str, joint: int = 1, **shape: float) -> Effect:
     return catalogue()[name]((joint,), shape)
 
 
-def test_the_usual_motion_is_smooth_and_within_the_limits(robot: Robot) -> None:
-    s = usual(robot, crept(robot, SLOW)).signals
-    lower, upper = robot.limits.ranges()
+def test_the_usual_motion_is_smooth_within_the_limits_and_as_fast_as_what_was_seen() -> None:
+    s = usual(crept(SLOW)).signals
+    lower, upper = ROBOT.limits.ranges()
     assert (s.q >= lower).all()
     assert (s.q <= upper).all()
-    assert (np.abs(s.v) <= robot.limits.velocity).all()
+    assert (np.abs(s.v) <= ROBOT.limits.velocity).all()
     inner = slice(1, -1)
     assert s.rate(s.q)[inner] == pytest.approx(s.v[inner], abs=2e-2)
     assert s.rate(s.v)[inner] == pytest.approx(s.a[inner], abs=1e-1)
     assert np.abs(s.v).max(axis=0).min() > 10 * SLOW
-
-
-def test_it_is_never_slower_than_what_was_seen(robot: Robot) -> None:
-    fast = crept(robot, FAST)
-    fast = replace(fast, v=np.where(np.arange(robot.n) == 1, 40.0, fast.v))
-    width = [np.abs(usual(robot, each).signals.v[:, 1]).max() for each in (fast, crept(robot, 0.1))]
+    # It is never slower than what was seen.
+    fast = crept(FAST)
+    fast = replace(fast, v=np.where(np.arange(ROBOT.n) == 1, 40.0, fast.v))
+    width = [np.abs(usual(each).signals.v[:, 1]).max() for each in (fast, crept(0.1))]
     assert width[0] > width[1]
 
 
-def test_a_spring_of_a_joint_that_crept_is_not_known(robot: Robot) -> None:
+def test_a_spring_of_a_joint_that_crept_is_not_known() -> None:
     """It is 0.15 N·m in the data and would be 20 at the ends; all torque is 3 N·m."""
-    seen = crept(robot, SLOW)
-    tau = np.full((SAMPLES, robot.n), TORQUE)
+    seen = crept(SLOW)
+    tau = np.full((SAMPLES, ROBOT.n), TORQUE)
     effects = [kind("spring"), kind("viscous_friction"), kind("torque_offset")]
-    data, candidates = made(robot, seen, effects, tau)
-    assert torque_seen(data) == pytest.approx(np.full(robot.n, TORQUE))
-    reach = Reach(candidates, data, usual(robot, seen), always=[1])
+    data, candidates = made(seen, effects, tau)
+    assert torque_seen(data) == pytest.approx(np.full(ROBOT.n, TORQUE))
+    reach = Reach(candidates, data, usual(seen), always=[1])
     stiff = np.array([20.0, 0.0])
     reason = reach.why_not(0, stiff)
     assert "over the joint's range and speed" in reason
@@ -90,27 +84,14 @@ def test_a_spring_of_a_joint_that_crept_is_not_known(robot: Robot) -> None:
     assert not reach.why_not(1, np.array([1e3]))  # every robot has it
     assert not reach.why_not(2, np.array([1e3]))  # as large in the data
     assert reach.why_not(0, -stiff)
+    large = Seen(np.full(ROBOT.n, 1e9), np.ones(ROBOT.n), 1.0)
+    sizes = PossibleSizes(candidates, lambda _, d: d.T @ d, large, (), reach)
+    assert "the joint's range and speed" in sizes.why_not(stiff, [0], [0])
 
 
-def test_what_was_seen_over_the_range_may_be_any(robot: Robot) -> None:
-    seen = crept(robot, FAST)
-    data, candidates = made(robot, seen, [kind("spring")], np.full((SAMPLES, robot.n), TORQUE))
-    reach = Reach(candidates, data, usual(robot, seen))
-    assert not reach.why_not(0, np.array([20.0, 0.0]))
-
-
-def test_nothing_is_said_of_what_some_runs_have(robot: Robot) -> None:
-    seen = crept(robot, SLOW)
+def test_what_was_seen_over_the_range_or_is_of_some_runs_may_be_any() -> None:
     some = replace(kind("viscous_friction"), runs=("",))
-    data, candidates = made(robot, seen, [some], np.full((SAMPLES, robot.n), TORQUE))
-    assert not Reach(candidates, data, usual(robot, seen)).why_not(0, np.array([1e6]))
-
-
-def test_it_is_a_reason_why_a_size_is_impossible(robot: Robot) -> None:
-    seen = crept(robot, SLOW)
-    data, candidates = made(robot, seen, [kind("spring")], np.full((SAMPLES, robot.n), TORQUE))
-    large = Seen(np.full(robot.n, 1e9), np.ones(robot.n), 1.0)
-    sizes = PossibleSizes(
-        candidates, lambda _, d: d.T @ d, large, (), Reach(candidates, data, usual(robot, seen))
-    )
-    assert "the joint's range and speed" in sizes.why_not(np.array([20.0, 0.0]), [0], [0])
+    for fastest, one, size in ((FAST, kind("spring"), [20.0, 0.0]), (SLOW, some, [1e6])):
+        seen = crept(fastest)
+        data, candidates = made(seen, [one], np.full((SAMPLES, ROBOT.n), TORQUE))
+        assert not Reach(candidates, data, usual(seen)).why_not(0, np.array(size))

@@ -4,52 +4,33 @@ The robot pauses and cools in between, so that time is no substitute for the col
 another joint falls with time, and so does a battery.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.load import load_spec, spec_as_yaml
-from excite_cli.config.spec import Spec
-from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.diagnosis.words import changes_in_words
-from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.errors import ConfigError
 from excite_cli.export.found_config import found_config
 from excite_cli.identification.identify import identify
 from excite_cli.measurement.covariates import with_declared
 from excite_cli.measurement.dataset import Dataset
-from excite_cli.robot.model import Robot, build_robot
+from excite_cli.simulation.covariate_series import CovariateSeries
+from excite_cli.simulation.ground_truth import plant
 from excite_cli.store.diagnosis_file import read_diagnosis, write_diagnosis
 from excite_cli.store.fit_file import read_fit, write_fit
 from tests.cli.program import SMOKE
-from tests.diagnosis.test_changes import (
-    ALWAYS,
-    ELBOW,
-    PITCH,
-    RATE,
-    RUNS,
-    YAW,
-    motion,
-    planted,
-    what,
-)
-
-pytest.importorskip("mujoco")
-
-from excite_cli.simulation.covariate_series import CovariateSeries
-from excite_cli.simulation.ground_truth import plant
-from excite_cli.simulation.settings import SimulationSettings
-from excite_cli.simulation.simulate import simulate
+from tests.diagnosis import simulated_arm
+from tests.diagnosis.simulated_arm import BASE, ELBOW, PITCH, ROBOT, YAW, planted, played
+from tests.diagnosis.test_changes import ALWAYS, RUNS, what
 
 KINDS = (
-    "[viscous_friction,coulomb_friction,torque_offset,friction_change,friction_drift,"
-    "covariate_friction,covariate_offset]"
+    "viscous_friction,coulomb_friction,torque_offset,friction_change,friction_drift,"
+    "covariate_friction,covariate_offset"
 )
 CLOCK = tuple(np.linspace(0.0, 2400.0, RUNS))
 TEMP = CovariateSeries("temp", CLOCK, (25.0, 39.0, 45.0, 33.0, 28.0, 41.0), 0.2)
@@ -60,22 +41,7 @@ AT_25, COULOMB, VISCOUS = 25.0, 4.1, 1.0  # both fall by half over 20 degrees
 
 
 @pytest.fixture(scope="module")
-def spec() -> Spec:
-    return load_spec(SMOKE, [f"diagnosis.kinds={KINDS}"])
-
-
-@pytest.fixture(scope="module")
-def robot(spec: Spec) -> Robot:
-    return build_robot(spec.robot, SMOKE.parent)
-
-
-@pytest.fixture(scope="module")
-def base(robot: Robot) -> BaseParameters:
-    return find_base_parameters(robot)
-
-
-@pytest.fixture(scope="module")
-def measured(robot: Robot) -> Dataset:
+def measured() -> Dataset:
     slopes = {"viscous_slope": -VISCOUS / 40.0, "reference": AT_25}
     kind = kind_named("covariate_friction")
     line = {"time_constant": 20.0 * CLOCK[-1], "span": CLOCK[-1]}
@@ -88,34 +54,25 @@ def measured(robot: Robot) -> Dataset:
         plant(kind, (PITCH,), -COULOMB / 40.0, slopes, covariate="temp"),
     ]
     pause = (CLOCK[-1] - 4.0 * RUNS) / (RUNS - 1)
-    covariates = (TEMP, AMBIENT, BATTERY)
-    settings = SimulationSettings(rate=RATE, lead_in=0.5, pause=pause, covariates=covariates)
-    motions = [motion(robot, number) for number in range(1, RUNS + 1)]
-    return simulate(robot, motions, settings, effects).dataset
+    columns = (TEMP, AMBIENT, BATTERY)
+    return played(effects, range(1, RUNS + 1), 4.0, 100.0, pause=pause, covariates=columns)
 
 
-def declaring(spec: Spec, columns: Sequence[str]) -> Spec:
-    measurement = spec.measurement.model_copy(update={"covariates": tuple(columns)})
-    return spec.model_copy(update={"measurement": measurement})
-
-
-def diagnosed(
-    robot: Robot, base: BaseParameters, spec: Spec, data: Dataset, columns: Sequence[str]
-) -> Diagnosis:
-    return diagnose(robot, base, with_declared(data, columns), declaring(spec, columns))
+def diagnosed(data: Dataset, kinds: str, columns: list[str], *keys: str) -> Diagnosis:
+    declared = f"measurement.covariates=[{','.join(columns)}]"
+    return simulated_arm.told(with_declared(data, columns), kinds, declared, *keys)
 
 
 @pytest.fixture(scope="module")
-def told(robot: Robot, base: BaseParameters, spec: Spec, measured: Dataset) -> Diagnosis:
-    return diagnosed(robot, base, spec, measured, COLUMNS)
+def told(measured: Dataset) -> Diagnosis:
+    return diagnosed(measured, KINDS, COLUMNS)
 
 
 @pytest.fixture(scope="module")
-def untold(robot: Robot, base: BaseParameters, spec: Spec, measured: Dataset) -> Diagnosis:
+def untold(measured: Dataset) -> Diagnosis:
     """With few kinds: the runs of what changed take time to search."""
-    few = spec.diagnosis.model_copy(update={"kinds": ("coulomb_friction", "friction_change")})
-    update = {"diagnosis": few, "effects": (EffectSpec(kind="viscous_friction"),)}
-    return diagnosed(robot, base, spec.model_copy(update=update), measured, [])
+    few = "coulomb_friction,friction_change"
+    return diagnosed(measured, few, [], "effects=[{kind: viscous_friction}]")
 
 
 def followed(found: Diagnosis, joint: str = "shoulder_pitch") -> NamedEffect:
@@ -126,12 +83,6 @@ def followed(found: Diagnosis, joint: str = "shoulder_pitch") -> NamedEffect:
         if each.effect.joints == (joint,) and catalogue()[each.effect.kind].changes_of
     ]
     return one
-
-
-def test_a_column_that_says_the_same_as_time_is_its_alias(told: Diagnosis) -> None:
-    found = followed(told, "elbow")
-    names = {(each.kind, each.covariate) for each in (found.effect, *found.aliases)}
-    assert names >= {("covariate_friction", "battery"), ("friction_change", "")}
 
 
 def test_the_temperature_is_named_and_the_decoy_is_not(told: Diagnosis) -> None:
@@ -146,10 +97,7 @@ def test_the_temperature_is_named_and_the_decoy_is_not(told: Diagnosis) -> None:
     for name, true in (("coulomb_slope", -COULOMB / 40.0), ("viscous_slope", -VISCOUS / 40.0)):
         size = found.parameters[name]
         assert size.value == pytest.approx(true, abs=max(3.0 * size.std, 0.02 * abs(true)))
-
-
-def test_friction_beside_it_is_that_at_the_reference(told: Diagnosis) -> None:
-    found = followed(told)
+    # Friction beside it is that at the reference.
     reference = found.parameters["reference"].value
     assert reference == pytest.approx(np.mean(TEMP.values[:-1]), abs=1.0)
     (dry,) = [
@@ -163,55 +111,50 @@ def test_friction_beside_it_is_that_at_the_reference(told: Diagnosis) -> None:
         and f"N·m per unit of temp; it is {dry:.3g} at {reference:.4g}." in text
         for text in changes_in_words(told)
     )
+    # A column that says the same as time is its alias.
+    found = followed(told, "elbow")
+    names = {(each.kind, each.covariate) for each in (found.effect, *found.aliases)}
+    assert names >= {("covariate_friction", "battery"), ("friction_change", "")}
 
 
 def test_with_the_column_the_held_out_error_is_that_of_noise_and_without_it_more(
     told: Diagnosis, untold: Diagnosis
 ) -> None:
+    """And a change over time is named in its place."""
     joint = "shoulder_pitch"
     assert told.after.relative_moving[joint] < 0.02 < 0.04 < untold.after.relative_moving[joint]
     assert not told.joints_with_residual
-
-
-def test_without_the_column_a_change_over_time_is_named(untold: Diagnosis) -> None:
-    changed = {
-        each.effect.kind
-        for each in untold.effects
-        if each.effect.joints == ("shoulder_pitch",)
-        and (each.effect.runs or each.effect.kind in ("friction_change", "friction_drift"))
-    }
-    assert changed
+    there = [each.effect for each in untold.effects if each.effect.joints == (joint,)]
+    assert any(each.runs or each.kind == "friction_change" for each in there)
 
 
 def test_what_was_found_is_stored_and_goes_into_a_config_that_is_identified(
-    robot: Robot, base: BaseParameters, spec: Spec, measured: Dataset, told: Diagnosis,
-    tmp_path: Path,
-) -> None:  # fmt: skip
-    given = declaring(spec, COLUMNS)
+    measured: Dataset, told: Diagnosis, tmp_path: Path
+) -> None:
+    columns = f"measurement.covariates=[{','.join(COLUMNS)}]"
+    given = load_spec(SMOKE, [f"diagnosis.kinds=[{KINDS}]", columns])
     write_diagnosis(tmp_path / "d.h5", replace(told, config=spec_as_yaml(given)))
     back = read_diagnosis(tmp_path / "d.h5")
     assert [each.effect for each in back.effects] == [each.effect for each in told.effects]
     better = tmp_path / "better.yaml"
     text = found_config(given, SMOKE.parent, back, better)
     better.write_text(text, encoding="utf-8")
-    declared = load_spec(better, [])
-    found = identify(robot, base, with_declared(measured, COLUMNS), declared)
+    found = identify(ROBOT, BASE, with_declared(measured, COLUMNS), load_spec(better, []))
     at = found.fit.names.index("covariate_friction.coulomb_slope[shoulder_pitch; temp]")
     assert found.fit.values[at] == pytest.approx(-COULOMB / 40.0, rel=0.03)
-    write_fit(tmp_path / "f.h5", found, text, str(tmp_path), robot.fingerprint())
+    write_fit(tmp_path / "f.h5", found, text, str(tmp_path), ROBOT.fingerprint())
     assert read_fit(tmp_path / "f.h5").fit.effects == found.fit.effects
-    undeclared = declaring(declared, ["ambient"])
+    fewer = load_spec(better, ["measurement.covariates=[ambient]"])
     with pytest.raises(ConfigError, match=r"covariate: 'temp' is not declared.*ambient"):
-        identify(robot, base, with_declared(measured, ["ambient"]), undeclared)
+        identify(ROBOT, BASE, with_declared(measured, ["ambient"]), fewer)
 
 
-def test_what_fits_no_name_is_told_to_depend_on_the_column(
-    robot: Robot, base: BaseParameters, spec: Spec, measured: Dataset
-) -> None:
-    plain = ("viscous_friction", "coulomb_friction", "torque_offset")
-    diagnosis = spec.diagnosis.model_copy(update={"kinds": plain, "exclude": plain[:2]})
-    effects = (EffectSpec(kind=plain[0]), EffectSpec(kind=plain[1]))
-    bare = spec.model_copy(update={"diagnosis": diagnosis, "effects": effects})
-    found = diagnosed(robot, base, bare, measured, ["ambient", "temp"])
+def test_what_fits_no_name_is_told_to_depend_on_the_column(measured: Dataset) -> None:
+    keys = [
+        "diagnosis.exclude=[viscous_friction, coulomb_friction]",
+        "effects=[{kind: viscous_friction}, {kind: coulomb_friction}]",
+    ]
+    kinds = "viscous_friction,coulomb_friction,torque_offset"
+    found = diagnosed(measured, kinds, ["ambient", "temp"], *keys)
     (left,) = [each for each in found.unexplained if each.joint == "shoulder_pitch"]
     assert left.depends_on[0].code == "column[temp]"

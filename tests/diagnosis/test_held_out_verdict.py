@@ -24,17 +24,10 @@ UNSURE = np.linspace(-0.002, 0.03, 1000)  # a sixteenth of the draws says the op
     ("sign", "verdict"), [(1.0, HeldOutVerdict.CONFIRMED), (-1.0, HeldOutVerdict.HARMFUL)]
 )
 def test_what_nearly_all_draws_say_is_the_verdict(sign: float, verdict: HeldOutVerdict) -> None:
+    """The error where joints stand must not contradict."""
     assert held_out_verdict(sign * SURE, 0.02 * sign) is verdict
-    assert held_out_verdict(sign * UNSURE, 0.02 * sign) is HeldOutVerdict.NOT_CONFIRMED
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_the_error_where_joints_stand_must_not_contradict(sign: float) -> None:
-    assert held_out_verdict(sign * SURE, -0.02 * sign) is HeldOutVerdict.NOT_CONFIRMED
-
-
-def test_without_draws_nothing_is_confirmed() -> None:
-    assert held_out_verdict(np.zeros(0), 0.02) is HeldOutVerdict.NOT_CONFIRMED
+    for draws, whole in ((sign * UNSURE, sign), (sign * SURE, -sign), (np.zeros(0), 1.0)):
+        assert held_out_verdict(draws, 0.02 * whole) is HeldOutVerdict.NOT_CONFIRMED
 
 
 def recording(seconds: float, still: bool = False) -> tuple[PreparedRun, Prediction, Prediction]:
@@ -51,22 +44,17 @@ def recording(seconds: float, still: bool = False) -> tuple[PreparedRun, Predict
 
 
 def test_draws_tell_what_is_removed_from_the_mean_relative_error() -> None:
+    """Of all joints, or of those beside one."""
     run, worse, better = recording(5.0)
     assert removed_in_draws([run], [worse], [better]).mean() == pytest.approx(0.01, rel=0.1)
     assert removed_in_draws([run], [better], [worse]).max() < 0.0
-
-
-def test_they_tell_it_of_the_joints_beside_one() -> None:
-    run, worse, better = recording(5.0)
     torque = np.column_stack([better.torque[:, 0], worse.torque[:, 1]])
     one = replace(better, torque=torque)  # on the first joint alone
     assert removed_in_draws([run], [worse], [one]).min() > 0.0
     assert np.all(removed_in_draws([run], [worse], [one], beside=0) == 0.0)
     assert removed_in_draws([run], [worse], [one], beside=1).min() > 0.0
-
-
-def test_few_blocks_are_no_evidence_nor_is_a_robot_that_stands() -> None:
-    """Four blocks, of 0.2 s at least, may agree by chance."""
+    # Few blocks are no evidence nor is a robot that stands. Four blocks, of 0.2 s at least, may
+    # agree by chance.
     for run, worse, better in (recording(0.8), recording(5.0, still=True)):
         assert len(removed_in_draws([run], [worse], [better])) == 0
     run, worse, better = recording(1.0)

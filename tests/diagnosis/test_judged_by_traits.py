@@ -22,8 +22,7 @@ from excite_cli.effects.catalogue import catalogue
 from excite_cli.identification.declared_states import LeftOut
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array
-from tests.diagnosis.explicit_data import anything, effect
-from tests.diagnosis.test_judgement import TOTAL, on_joint_0, planted
+from tests.diagnosis.explicit_data import TOTAL, anything, effect, on_joint_0, planted
 from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
 
@@ -77,7 +76,7 @@ REFINED: Mapping[str, tuple[str, ...]] = {
 
 def a_search(effects: Sequence[Effect], mix: Array, torque: Sequence[float]) -> Search:
     """On columns of joint 0 that are orthogonal directions times `mix`; noise is of RMS one."""
-    data, candidates = planted(effects, mix, on_joint_0(torque))
+    data, candidates = planted(effects, on_joint_0(torque), mix)
     plain = data.evidence(candidates, NoiseModel.white(np.ones(2)))
     return Search(Judgement(plain, plain, candidates, NO_VETO, anything))
 
@@ -88,28 +87,19 @@ def of(kind: str) -> Effect:
     return found((0,), found.planted(1.0, {})[0])
 
 
-def test_every_kind_is_stated() -> None:
-    assert set(STATED) == set(catalogue())
-
-
 @pytest.mark.parametrize("kind", list(STATED))
-def test_it_is_named_where_it_saves_its_price_and_not_before(kind: str) -> None:
+def test_it_is_named_where_it_saves_its_price_and_asked_for_in_its_turn(kind: str) -> None:
     one = of(kind)
     width = len(one.parameters)
-    price = chi2.isf(ALPHA, width) + STATED[kind][0]
+    surplus, turn, _ = STATED[kind]
+    price = chi2.isf(ALPHA, width) + surplus
     for saved, found in ((price - 0.5, []), (price + 0.5, [0])):
         torque = np.zeros(width)
         torque[0] = np.sqrt(saved / TOTAL)
         assert a_search([one], np.eye(width), torque).run() == found
-
-
-@pytest.mark.parametrize("kind", list(STATED))
-def test_it_is_asked_for_in_its_turn(kind: str) -> None:
-    one = of(kind)
-    width = len(one.parameters)
     search = a_search([one], np.eye(width), np.ones(width))
     turns = [int(tier) for tier in Tier if search._forward([], tier)]
-    assert turns == [turn for turn in (1, 2, 3) if turn >= STATED[kind][1]]
+    assert turns == [each for each in (1, 2, 3) if each >= turn]
 
 
 def test_a_constant_that_noise_bends_a_little_is_no_spring() -> None:
@@ -121,6 +111,7 @@ def test_a_constant_that_noise_bends_a_little_is_no_spring() -> None:
 
 
 def test_noise_is_measured_with_all_usual_effects_in() -> None:
+    assert set(STATED) == set(catalogue()), "every kind is stated"
     effects = [of(kind) for kind in STATED]
     candidates = [Candidate(one, (0,), ()) for one in effects]
     kinds = {candidates[i].effect.kind for i in _usual(candidates, [])}
@@ -159,37 +150,23 @@ def signals() -> list[Signals]:
 
 
 @pytest.mark.parametrize(
-    ("kind", "shape", "steps"),
+    ("kind", "name", "value", "steps"),
     [
-        ("stribeck_friction", {"stribeck_speed": 0.2}, [0.07, 0.03, 0.012, 0.004]),
-        ("dahl_friction", {"distance": 0.1}, [0.04, 0.025, 0.015, 8e-3, 3e-3, 1e-3]),
-        ("torque_saturation", {"level": 10.0}, [0.5, 0.2, 0.08, 0.03, 0.01]),
-        ("backlash", {"gap": 0.01}, [1.5e-3, 6e-4, 2e-4, 7e-5]),
+        ("stribeck_friction", "stribeck_speed", 0.2, [0.07, 0.03, 0.012, 0.004]),
+        ("dahl_friction", "distance", 0.1, [0.04, 0.025, 0.015, 8e-3, 3e-3, 1e-3]),
+        ("torque_saturation", "level", 10.0, [0.5, 0.2, 0.08, 0.03, 0.01]),
+        ("backlash", "gap", 0.01, [1.5e-3, 6e-4, 2e-4, 7e-5]),
+        ("nonlinear_viscous_friction", "power", 2.0, None),  # one of few stays open
+        ("coupled_friction", "direction", 1.0, None),
     ],
 )
 def test_shapes_are_refined_as_finely_as_they_are_seen(
-    kind: str, shape: Mapping[str, float], steps: Sequence[float]
+    kind: str, name: str, value: float, steps: Sequence[float] | None
 ) -> None:
-    ((name, value),) = shape.items()
-    first, *others = shapes_around(effect(kind, **shape), signals())
-    assert first == dict(shape)
-    expected = [value + sign * step for step in steps for sign in (-1, 1)]
-    assert [each[name] for each in others] == pytest.approx(expected)
-
-
-@pytest.mark.parametrize(
-    ("kind", "shape", "others"),
-    [
-        ("nonlinear_viscous_friction", {"power": 2.0}, [0.5, 3.0]),
-        ("coupled_friction", {"direction": 1.0}, [-1.0]),
-    ],
-)
-def test_a_shape_that_is_one_of_few_stays_open(
-    kind: str, shape: Mapping[str, float], others: Sequence[float]
-) -> None:
-    ((name, _),) = shape.items()
-    found = shapes_around(effect(kind, **shape), signals())
-    assert [each[name] for each in found] == [shape[name], *others]
+    found = [each[name] for each in shapes_around(effect(kind, **{name: value}), signals())]
+    few = {"power": [0.5, 3.0], "direction": [-1.0]}
+    expected = [value + sign * step for step in steps or () for sign in (-1, 1)] or few[name]
+    assert found == pytest.approx([value, *expected])
 
 
 def test_ripple_is_refined_by_parts_of_a_cycle_and_a_touch_by_parts_of_its_length() -> None:
@@ -209,27 +186,7 @@ def test_ripple_is_refined_by_parts_of_a_cycle_and_a_touch_by_parts_of_its_lengt
     assert len(others) == len(starts) + len(ends)
 
 
-def test_a_shaft_of_two_joints_must_not_stand_still() -> None:
-    effects = [of("viscous_friction"), effect("coupled_friction", 1, 2, direction=-1.0)]
-    assert LeftOut.by(effects).coupled == ((1, 2, -1.0),)
-    assert LeftOut.by([of(kind) for kind in STATED if kind != "coupled_friction"]).coupled == ()
-
-
-@pytest.mark.parametrize(("slowest", "left"), [(0.001, 5), (0.03, 3), (10.0, 0)])
-def test_peaks_of_friction_below_the_speeds_that_count_are_not_looked_for(
-    slowest: float, left: int
-) -> None:
-    robot = random_robot(4, joints=1, branches=False, prismatic=False)
-    run = signals_of(robot, 300)
-    spec = DiagnosisSpec(kinds=("stribeck_friction", "armature"), moving_speed=slowest)
-    found = possible_effects(spec, (), SeenRuns(robot, [run], [run.load], ["run"]), {})
-    speeds = [e.shape["stribeck_speed"] for e, _ in found if e.kind == "stribeck_friction"]
-    assert len(speeds) == left
-    assert all(speed >= slowest for speed in speeds)
-    assert len(found) == left + 1
-
-
-def test_what_changes_with_time_needs_three_recordings() -> None:
+def test_what_is_looked_for() -> None:
     """Or somebody who asks for it by name."""
     robot = random_robot(4, joints=1, branches=False, prismatic=False)
     run = signals_of(robot, 300)
@@ -244,10 +201,11 @@ def test_what_changes_with_time_needs_three_recordings() -> None:
     assert not drifts(2, every)
     assert drifts(3, every)
     assert drifts(2, DiagnosisSpec(kinds=("friction_drift",)))
-
-
-def test_a_touch_of_a_moment_is_none() -> None:
-    """A blow of 60 ms is a fault of the record; 200 ms are a touch."""
+    # A shaft of two joints must not stand still.
+    effects = [of("viscous_friction"), effect("coupled_friction", 1, 2, direction=-1.0)]
+    assert LeftOut.by(effects).coupled == ((1, 2, -1.0),)
+    assert LeftOut.by([of(kind) for kind in STATED if kind != "coupled_friction"]).coupled == ()
+    # A touch of a moment is none. A blow of 60 ms is a fault of the record; 200 ms are a touch.
     robot = random_robot(4, joints=3, branches=False, prismatic=False)
     run = signals_of(robot, 800, step=0.01)
     kind = catalogue()["contact"]
@@ -255,3 +213,17 @@ def test_a_touch_of_a_moment_is_none() -> None:
         touch = kind((0, 1, 2), {"start": 3.0, "end": 3.0 + seconds})
         residual = touch.torque(run, np.array([30.0, -40.0, 20.0]))
         assert len(kind.tuned(robot, (0, 1, 2), [run], [residual])) == count
+
+
+@pytest.mark.parametrize(("slowest", "left"), [(0.001, 5), (0.03, 3), (10.0, 0)])
+def test_peaks_of_friction_below_the_speeds_that_count_are_not_looked_for(
+    slowest: float, left: int
+) -> None:
+    robot = random_robot(4, joints=1, branches=False, prismatic=False)
+    run = signals_of(robot, 300)
+    spec = DiagnosisSpec(kinds=("stribeck_friction", "armature"), moving_speed=slowest)
+    found = possible_effects(spec, (), SeenRuns(robot, [run], [run.load], ["run"]), {})
+    speeds = [e.shape["stribeck_speed"] for e, _ in found if e.kind == "stribeck_friction"]
+    assert len(speeds) == left
+    assert all(speed >= slowest for speed in speeds)
+    assert len(found) == left + 1

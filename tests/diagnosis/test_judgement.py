@@ -1,6 +1,6 @@
 """Prices, gains and vetoes against stacked rows, and against closed forms on orthogonal columns."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,85 +10,27 @@ from scipy.stats import chi2
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
-from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
 from excite_cli.diagnosis.schur import Gain
 from excite_cli.diagnosis.search import Search
-from excite_cli.diagnosis.training import TrainingData
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.base import Effect
 from excite_cli.effects.coulomb_friction import CoulombFriction
-from excite_cli.effects.seen import Seen
-from excite_cli.robot.model import Array
 from tests.diagnosis.explicit_data import (
     FIXED,
     FOLDS,
+    RULES,
+    TOTAL,
     Rows,
     anything,
     autoregression,
     effect,
-    prepared,
+    judge_of,
+    on_joint_0,
+    planted,
     random_candidates,
     random_data,
     rows_of,
 )
-
-LARGE = Seen(np.full(2, 1e12), np.zeros(2), 1e12)
-SAMPLES = 50
-TOTAL = SAMPLES * len(FOLDS)
-RULES = Rules(0.01, 0.01)
-Allowed = Callable[[Array, Sequence[int], Sequence[int]], bool]
-
-
-def planted(
-    effects: Sequence[Effect],
-    mix: Array,
-    torque: Array,
-    noise: float = 1.0,
-    declared: float = 0.0,
-    seed: int = 0,
-) -> tuple[TrainingData, list[Candidate]]:
-    """Orthogonal directions of RMS one in every part, of which columns and torque are made.
-
-    Columns of all effects in turn are directions @ `mix` (on all their joints), torque is
-    directions @ `torque` (directions, joints), `declared` of the declared model, and noise that is
-    orthogonal to all of them and of exactly this RMS. So every fold says the same.
-    """
-    rng = np.random.default_rng(seed)
-    count = FIXED + len(mix)
-    fixed, columns, tau = [], [], []
-    for _ in FOLDS:
-        free, _ = np.linalg.qr(rng.normal(size=(SAMPLES, count + 2)))
-        free *= np.sqrt(SAMPLES)
-        fixed.append(np.repeat(free[:, None, :FIXED], 2, axis=1))
-        columns.append(free[:, FIXED:count] @ mix)
-        tau.append(free[:, FIXED:count] @ torque + noise * free[:, count:] + declared * free[:, :1])
-    candidates, at = [], 0
-    for one in effects:
-        own = slice(at, at + len(one.parameters))
-        blocks = tuple(np.repeat(c[:, None, own], len(one.joints), axis=1) for c in columns)
-        candidates.append(Candidate(one, one.joints, blocks))
-        at = own.stop
-    assert at == mix.shape[1]
-    runs = tuple(prepared(np.ones((SAMPLES, 2), bool)) for _ in FOLDS)
-    return TrainingData(runs, FOLDS, tuple(fixed), tuple(tau)), candidates
-
-
-def judge_of(
-    data: TrainingData,
-    candidates: Sequence[Candidate],
-    rules: Rules = RULES,
-    allowed: Allowed | None = None,
-) -> Judgement:
-    """Samples are independent and of unit noise; sizes are those that are possible."""
-    plain = data.evidence(candidates, NoiseModel.white(np.ones(2)))
-    sizes = PossibleSizes(candidates, spread_of(plain.covariance, 1.0), LARGE)
-    veto = sizes if allowed is None else allowed
-    return Judgement(plain, plain, candidates, rules, veto)
-
-
-def on_joint_0(sizes: Sequence[float]) -> Array:
-    """Torque (directions, 2) of joint 0 alone."""
-    return np.stack([sizes, np.zeros(len(sizes))], axis=1)
 
 
 def orthogonal(
@@ -101,7 +43,7 @@ def orthogonal(
     """One-column effects of joint 0 by kind and RMS of their torque."""
     effects = [effect(kind) for kind in sizes]
     torque = on_joint_0(list(sizes.values()))
-    data, candidates = planted(effects, np.eye(len(effects)), torque, noise, declared)
+    data, candidates = planted(effects, torque, None, noise, declared)
     return judge_of(data, [replace(c, tests=tests) for c in candidates], rules)
 
 
@@ -125,19 +67,11 @@ def test_the_price_is_what_chance_makes_of_all_tests(
 ) -> None:
     """The mean number of tests that χ² without an effect passes is α."""
     one = effect(kind)
-    data, [candidate] = planted([one], np.ones((1, len(one.parameters))), np.zeros((1, 2)))
+    data, [candidate] = planted([one], np.zeros((1, 2)), np.ones((1, len(one.parameters))))
     judge = judge_of(data, [replace(candidate, tests=tests)], Rules(0.03, 0.01, inflation))
     threshold = (judge.price(0, dof) - one.prior_cost) / inflation
     assert tests * chi2.sf(threshold, dof) == pytest.approx(0.03)
     assert judge.price(0, 0) == judge.price(0, 1)
-
-
-def test_thresholds_of_candidates_with_other_tests_are_their_own() -> None:
-    judge = orthogonal({"viscous_friction": 0.0, "coulomb_friction": 0.0})
-    judge.candidates = [replace(c, tests=k) for c, k in zip(judge.candidates, (1, 50), strict=True)]
-    assert judge.price(0, 1) == pytest.approx(chi2.isf(0.01, 1))
-    assert judge.price(1, 1) == pytest.approx(chi2.isf(0.01 / 50, 1))
-    assert judge.price(0, 2) == pytest.approx(chi2.isf(0.01, 2))
 
 
 def test_cost_is_residual_energy_and_prices(random_judge: tuple[Judgement, Rows, Rows]) -> None:
@@ -151,11 +85,7 @@ def test_cost_is_residual_energy_and_prices(random_judge: tuple[Judgement, Rows,
         if {2, 4} <= set(chosen):
             price += 1.7 * 4.5 - prices[4]
         assert judge.cost(chosen) == pytest.approx(rows.energy(chosen) + price, rel=1e-8)
-
-
-def test_p_values_are_corrected_for_tests_and_inflation(
-    random_judge: tuple[Judgement, Rows, Rows],
-) -> None:
+    # P values are corrected for tests and inflation.
     judge, rows, _ = random_judge
     schur = judge.white.schur([1])
     for i, dof in ((0, 1), (2, 2), (3, 1)):
@@ -165,6 +95,15 @@ def test_p_values_are_corrected_for_tests_and_inflation(
     assert judge.p_value(3, Gain(30.0, 1, 1.0)) == pytest.approx(4 * chi2.sf(30.0 / 1.7, 1))
     assert judge.p_value(3, Gain(1e-3, 1, 1.0)) == 1.0  # a probability
     assert judge.p_value(3, Gain(0.0, 0, 0.0)) == 1.0
+    # Size is the share of the torque of any joint where it is most.
+    judge, _, rows = random_judge
+    for chosen, added in (([], [0]), ([], [2]), ([1], [3]), ([3], [1, 2])):
+        shares = [
+            (rows.energy(chosen, [j]) - rows.energy([*chosen, *added], [j]))
+            / np.sum(rows.y[rows.joint == j] ** 2)
+            for j in (0, 1)
+        ]
+        assert judge.size(chosen, added, [0, 1]) == pytest.approx(np.sqrt(max(shares)), rel=1e-6)
 
 
 def test_gains_on_blocks_left_out_are_those_of_explicit_fits() -> None:
@@ -186,8 +125,7 @@ def test_gains_on_blocks_left_out_are_those_of_explicit_fits() -> None:
             for noise in noises:
                 rows = rows_of(data, candidates, noise)
                 before, after = (
-                    rows.on_blocks(each, new=False)[joints].sum()
-                    for each in (chosen, [*chosen, *added])
+                    rows.on_blocks(each)[joints].sum() for each in (chosen, [*chosen, *added])
                 )
                 gains.append(1 - np.sqrt(after / before))
             assert judge.left_out_gain(chosen, added) == pytest.approx(max(gains), abs=1e-7)
@@ -202,8 +140,7 @@ def test_an_effect_of_some_runs_is_judged_where_it_is_on_blocks_in_turn(
     judge, *both = random_judge
     for chosen in ([], [0]):
         blocks = [
-            [rows.on_blocks(each, new=False)[0, 2:4].sum() for each in (chosen, [*chosen, 4])]
-            for rows in both
+            [rows.on_blocks(each)[0, 2:4].sum() for each in (chosen, [*chosen, 4])] for rows in both
         ]
         expected = max(1 - np.sqrt(after / before) for before, after in blocks)
         assert judge.left_out_gain(chosen, [4]) == pytest.approx(expected, rel=1e-3)
@@ -222,9 +159,9 @@ def test_a_push_that_no_other_block_of_a_second_knows_is_judged_by_what_it_expla
     judge = judge_of(data, [push], allowed=anything)
     rows = rows_of(data, [push], NoiseModel.white(np.ones(2)))
     assert judge.white.is_brief([0]) == brief
-    before = rows.on_blocks([], new=False)[0, 2:4].sum()
+    before = rows.on_blocks([])[0, 2:4].sum()
     explained = rows.energy([], [0]) - rows.energy([0], [0])
-    after = before - explained if brief else rows.on_blocks([0], new=False)[0, 2:4].sum()
+    after = before - explained if brief else rows.on_blocks([0])[0, 2:4].sum()
     expected = 1 - np.sqrt(after / before)
     assert expected > 0.3
     assert judge.left_out_gain([], [0]) == pytest.approx(expected, rel=1e-3)
@@ -232,22 +169,9 @@ def test_a_push_that_no_other_block_of_a_second_knows_is_judged_by_what_it_expla
     assert judge.failing([0]) == []
 
 
-def test_size_is_the_share_of_the_torque_of_any_joint_where_it_is_most(
-    random_judge: tuple[Judgement, Rows, Rows],
-) -> None:
-    judge, _, rows = random_judge
-    for chosen, added in (([], [0]), ([], [2]), ([1], [3]), ([3], [1, 2])):
-        shares = [
-            (rows.energy(chosen, [j]) - rows.energy([*chosen, *added], [j]))
-            / np.sum(rows.y[rows.joint == j] ** 2)
-            for j in (0, 1)
-        ]
-        assert judge.size(chosen, added, [0, 1]) == pytest.approx(np.sqrt(max(shares)), rel=1e-6)
-
-
 def test_what_spoils_the_inertias_of_another_joint_is_not_small() -> None:
     """A gain of joint 0 goes into a parameter that both joints have; joint 1 has the error."""
-    data, (gain,) = planted([effect("torque_gain", 0)], np.eye(1), np.zeros((1, 2)), noise=0.01)
+    data, (gain,) = planted([effect("torque_gain", 0)], np.zeros((1, 2)), noise=0.01)
     weak = 0.01  # of what the parameter does on joint 0, so that joint 0 decides its value
     for declared, columns, tau in zip(data.declared, gain.columns, data.tau, strict=True):
         declared[:, 1] *= weak
@@ -289,22 +213,13 @@ def test_first_order_friction_comes_before_what_refines_it() -> None:
     assert judge.in_order(schur, [], [2, 1])
     assert judge.in_order(judge.white.schur([1]), [1], [2])
     assert not judge.in_order(judge.white.schur([0]), [0], [2])
-
-
-@pytest.mark.parametrize(("energy", "waits"), [(0.9, False), (1.6, True)])
-def test_a_refinement_waits_for_what_is_worth_its_price(energy: float, waits: bool) -> None:
-    price = chi2.isf(0.01 / 20, 1)
-    sizes = {**FRICTION, "coulomb_friction": np.sqrt(energy * price / TOTAL)}
-    judge = orthogonal(sizes, tests=20)
-    assert judge.in_order(judge.white.schur([]), [], [2]) != waits
-
-
-def test_a_refinement_does_not_wait_for_friction_that_cannot_be() -> None:
-    judge = orthogonal({**FRICTION, "coulomb_friction": -3.0})
-    assert judge.in_order(judge.white.schur([]), [], [2])
-
-
-def test_parents_are_those_of_the_same_joint() -> None:
+    for energy, waits in ((0.9, False), (1.6, True)):  # of its price
+        worth = np.sqrt(energy * chi2.isf(0.01 / 20, 1) / TOTAL)
+        weak = orthogonal({**FRICTION, "coulomb_friction": worth}, tests=20)
+        assert weak.in_order(weak.white.schur([]), [], [2]) != waits
+    impossible = orthogonal({**FRICTION, "coulomb_friction": -3.0})
+    assert impossible.in_order(impossible.white.schur([]), [], [2])
+    # Parents are those of the same joint.
     effects = [
         effect("coulomb_friction", 1),
         effect("viscous_friction", 1),
@@ -316,7 +231,7 @@ def test_parents_are_those_of_the_same_joint() -> None:
         effect("armature", 1),
     ]
     width = sum(len(each.parameters) for each in effects)
-    judge = judge_of(*planted(effects, np.eye(width), np.zeros((width, 2))))
+    judge = judge_of(*planted(effects, np.zeros((width, 2))))
     found = [set(parents) for parents in judge.parents]
     assert found == [set(), set(), {0, 4}, set(), set(), {3}, {3, 1, 0}, set()]
     every = list(range(8))
@@ -334,7 +249,7 @@ def test_root_friction_binds_both_straight_terms(power: float, bound: bool) -> N
         effect("spring"),
     ]
     torque = on_joint_0([-1.0, 0.01, 1.0, 1.0, 0.0])
-    judge = judge_of(*planted(effects, np.eye(5), torque))
+    judge = judge_of(*planted(effects, torque))
     every = [0, 1, 2, 3]
     assert [judge.bound(i, every) for i in every] == [bound, bound, False, False]
     assert not judge.bound(0, [0, 1, 3])
@@ -370,7 +285,7 @@ def test_members_that_share_nearly_all_they_have_hold_if_they_are_significant() 
     mix = np.array([[1.0, 1.0], [0.0, 0.01]])
     effects = [effect("viscous_friction"), effect("coulomb_friction")]
     torque = on_joint_0([200.0, 1.0])  # 100 of each
-    judge = judge_of(*planted(effects, mix, torque))
+    judge = judge_of(*planted(effects, torque, mix))
     assert judge.plain.solve([0, 1])[FIXED:] == pytest.approx([100.0, 100.0], rel=1e-4)
     assert 0 not in judge.failing([0, 1])
     assert 1 not in judge.failing([0, 1])
@@ -384,7 +299,7 @@ def weighed(gain: float, std: float, on: Sequence[Effect]) -> Judgement:
 
     Effects have the columns of that weight: each explains all of it, beside free inertias.
     """
-    data, _ = planted([effect("torque_gain")], np.eye(1), np.zeros((1, 2)))
+    data, _ = planted([effect("torque_gain")], np.zeros((1, 2)))
     for declared, tau in zip(data.declared, data.tau, strict=True):
         declared[:, 1, 0] = 0.0
         tau[:, 1] *= 3.0  # the noise, beside which an effect of both rows looks smaller

@@ -1,37 +1,32 @@
 """Effects that only come near something else, by what is left beside them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.covariate import Covariate
-from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.misspecification import approximations
-from excite_cli.diagnosis.noise_model import NoiseModel
-from excite_cli.diagnosis.possible_sizes import PossibleSizes
 from excite_cli.diagnosis.records import Approximation, LargeRest
-from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
-from excite_cli.effects.seen import Seen
-from excite_cli.robot.model import Array
-from tests.diagnosis.explicit_data import FIXED, FOLDS, anything, prepared
+from tests.diagnosis.explicit_data import (
+    FIXED,
+    FOLDS,
+    SAMPLES,
+    Allowed,
+    effect,
+    planted,
+    prepared,
+    traced,
+)
 from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
 
 NAMES = ("a", "b")
-SAMPLES = 60
-ONE = NoiseModel.white(np.ones(2))
-Allowed = Callable[[Array, Sequence[int], Sequence[int]], bool]
-
-
-def effect(kind: str, *joints: int) -> Effect:
-    return catalogue()[kind](joints or (0,))
 
 
 def left(joint: str, *codes: str, share: float) -> LargeRest:
@@ -44,62 +39,9 @@ def function_of(*codes: str) -> Approximation:
     return Approximation(tuple(Covariate.of_code(code) for code in codes))
 
 
-NO_MODEL: Any = None  # none of what is tried here asks for it
-NO_MOTION: Any = None
-
-
 def all_but(vetoed: int) -> Allowed:
     """A veto of one candidate."""
     return lambda parameters, chosen, added: vetoed not in added
-
-
-def traced(
-    data: TrainingData,
-    candidates: Sequence[Candidate],
-    chosen: Sequence[int],
-    allowed: Allowed = anything,
-) -> SearchResult:
-    plain = data.evidence(candidates, ONE)
-    judge = Judgement(plain, plain, candidates, Rules(0.01, 0.01), allowed)
-    return SearchResult(
-        data, tuple(candidates), ONE, judge, tuple(chosen), np.zeros(0), (), np.ones(2), 1.0,
-        PossibleSizes(candidates, plain.covariance, Seen(np.ones(2), np.ones(2), 1.0)), NO_MODEL,
-        NO_MOTION,
-    )  # fmt: skip
-
-
-def planted(
-    effects: Sequence[Effect], torque: Array, mix: Array | None = None
-) -> tuple[TrainingData, list[Candidate]]:
-    """Orthogonal columns, times `mix`, on all joints of each effect, and noise of RMS one.
-
-    `torque` (columns, joints) is the RMS of each direction in the torque: so the energies that
-    effects explain are known.
-    """
-    rng = np.random.default_rng(0)
-    count = len(torque)
-    declared, columns, tau = [], [], []
-    for _ in FOLDS:
-        free = np.linalg.qr(rng.normal(size=(SAMPLES, FIXED + count + 2)))[0] * np.sqrt(SAMPLES)
-        declared.append(np.repeat(free[:, None, :FIXED], 2, axis=1))
-        own = free[:, FIXED : FIXED + count]
-        columns.append(own if mix is None else own @ mix)
-        tau.append(own @ torque + free[:, FIXED + count :])
-    candidates, at = [], 0
-    for one in effects:
-        width = len(one.parameters)
-        candidates.append(
-            Candidate(
-                one,
-                one.joints,
-                tuple(
-                    np.repeat(x[:, None, at : at + width], len(one.joints), axis=1) for x in columns
-                ),
-            )
-        )
-        at += width
-    runs = tuple(prepared(np.ones((SAMPLES, 2), bool)) for _ in FOLDS)
-    return TrainingData(runs, FOLDS, tuple(declared), tuple(tau)), candidates
 
 
 def beside(kind: str, words: Sequence[str], energy: float, joints: tuple[int, ...] = (0,)) -> bool:
@@ -188,18 +130,6 @@ def test_a_line_through_a_cubic_is_no_spring() -> None:
         assert approximations(traced(data, [spring], [0]), NAMES, rests) == expected
 
 
-def test_structure_counts_on_the_joint_where_an_effect_is_most() -> None:
-    """The effect explains more on b than on a, where another explains most of the torque."""
-    effects = [effect("viscous_friction", 0, 1), effect("armature", 0)]
-    torque = np.array([[3.0, 4.0], [9.0, 0.0]])
-    data, candidates = planted(effects, torque)
-    both = traced(data, candidates, [0, 1])
-    assert approximations(both, NAMES, [left("b", "time", share=0.99)]) == {}
-    large = [left("b", "time", share=20.0)]  # of the residual's energy of one
-    assert approximations(both, NAMES, large) == {0: function_of("time")}
-    assert approximations(both, NAMES, [left("a", "time", share=20.0)]) == {}
-
-
 def test_straight_friction_is_measured_without_what_refines_it() -> None:
     """Beside its refinement, which shares nearly all, little of Coulomb friction would be left."""
     mix = np.array([[1.0, 1.0], [0.0, 0.2]])
@@ -212,6 +142,22 @@ def test_straight_friction_is_measured_without_what_refines_it() -> None:
         data, candidates = planted([effect("coulomb_friction"), effect(kind)], torque, mix)
         found = approximations(traced(data, candidates, [0, 1]), NAMES, rests)
         assert set(found) == expected
+    # Structure counts on the joint where an effect is most. The effect explains more on b than on
+    # a, where another explains most of the torque.
+    effects = [effect("viscous_friction", 0, 1), effect("armature", 0)]
+    torque = np.array([[3.0, 4.0], [9.0, 0.0]])
+    data, candidates = planted(effects, torque)
+    both = traced(data, candidates, [0, 1])
+    assert approximations(both, NAMES, [left("b", "time", share=0.99)]) == {}
+    large = [left("b", "time", share=20.0)]  # of the residual's energy of one
+    assert approximations(both, NAMES, large) == {0: function_of("time")}
+    assert approximations(both, NAMES, [left("a", "time", share=20.0)]) == {}
+    # What cannot be on another joint is no matter.
+    kinds = (("viscous_friction", 0), ("stribeck_friction", 1), ("viscous_friction", 1))
+    effects = [effect(kind, joint) for kind, joint in kinds]
+    data, candidates = planted(effects, np.array([[1.0, 0.0], [0.0, 9.0], [0.0, 2.0]]))
+    found = approximations(traced(data, candidates, [0, 2], all_but(1)), NAMES, [])
+    assert set(found) == {2}
 
 
 @pytest.mark.parametrize("rival", [2.9, 3.1])
@@ -227,48 +173,6 @@ def test_what_cannot_be_and_explains_more_makes_a_name_doubtful(rival: float) ->
     assert approximations(traced(data, candidates, [0], all_but(2)), NAMES, []) == {}
     # Once the other is in, it stands for nothing else.
     assert approximations(traced(data, candidates, [0, 1], all_but(1)), NAMES, []) == {}
-
-
-@pytest.mark.parametrize(
-    ("kind", "doubted"), [("stribeck_friction", True), ("elasticity", True), ("armature", False)]
-)
-def test_what_cannot_be_and_depends_on_something_else_is_no_matter(
-    kind: str, doubted: bool
-) -> None:
-    """An inertia says nothing of a function of speed; a function of several quantities might."""
-    effects = [effect("viscous_friction"), effect(kind)]
-    data, candidates = planted(effects, np.array([[1.0, 0.0], [9.0, 0.0]]))
-    found = approximations(traced(data, candidates, [0], all_but(1)), NAMES, [])
-    assert set(found) == ({0} if doubted else set())
-
-
-def test_what_cannot_be_on_another_joint_is_no_matter() -> None:
-    kinds = (("viscous_friction", 0), ("stribeck_friction", 1), ("viscous_friction", 1))
-    effects = [effect(kind, joint) for kind, joint in kinds]
-    data, candidates = planted(effects, np.array([[1.0, 0.0], [0.0, 9.0], [0.0, 2.0]]))
-    found = approximations(traced(data, candidates, [0, 2], all_but(1)), NAMES, [])
-    assert set(found) == {2}
-
-
-def test_another_shape_of_a_chosen_effect_is_no_rival() -> None:
-    kind = catalogue()["stribeck_friction"]
-    effects = [kind((0,), {"stribeck_speed": 0.1}), kind((0,), {"stribeck_speed": 0.2})]
-    data, candidates = planted(effects, np.array([[1.0, 0.0], [9.0, 0.0]]))
-    assert approximations(traced(data, candidates, [0], all_but(1)), NAMES, []) == {}
-
-
-def test_structure_is_told_before_a_rival() -> None:
-    effects = [effect("viscous_friction"), effect("armature")]
-    data, candidates = planted(effects, np.array([[3.0, 0.0], [9.0, 0.0]]))
-    rests = [left("a", "v[a]", "time", share=0.5)]
-    found = approximations(traced(data, candidates, [0], all_but(1)), NAMES, rests)
-    assert found == {0: function_of("v[a]", "time")}
-
-
-def test_without_effects_there_is_nothing_to_doubt() -> None:
-    data, candidates = planted([effect("viscous_friction")], np.array([[3.0, 0.0]]))
-    rests = [left("a", "v[a]", share=0.9)]
-    assert approximations(traced(data, candidates, [], all_but(0)), NAMES, rests) == {}
 
 
 @pytest.mark.parametrize(
@@ -331,7 +235,7 @@ def test_a_wave_that_was_not_seen_to_repeat_is_doubted_beside_a_large_rest(
     robot = random_robot(4, joints=3, branches=False, prismatic=False)
     signals = signals_of(robot, samples=SAMPLES)
     periods = 2 * np.pi * cycles / float(np.ptp(signals.q[:, 0]))
-    wave, constant = catalogue()["ripple"]((0,), {"periods": periods}), effect("torque_offset")
+    wave, constant = effect("ripple", periods=periods), effect("torque_offset")
     torque = np.array([[10.0, 0.0], [10.0, 0.0], [3.0, 0.0]])
     data, candidates = planted([wave, constant], torque)
     there = replace(traced(data, candidates, [0, 1]), signals=(signals,) * len(FOLDS))
@@ -348,7 +252,7 @@ def test_friction_is_the_mean_of_what_varies_it_and_is_none(
     size: float, expected: set[int]
 ) -> None:
     """Coulomb friction of energy 49 or 25 beside one that varies it, of 10, with 2 left."""
-    varied = catalogue()["position_friction"]((0,), {"periods": 1.0, "power": 0.0})
+    varied = effect("position_friction", periods=1.0, power=0.0)
     torque = np.array([[size, 0.0], [np.sqrt(10.0), 0.0], [0.0, 0.0], [1.4, 0.0]])
     data, candidates = planted([effect("coulomb_friction"), varied], torque)
     rests = [left("a", "q[a]", share=0.7)]
@@ -368,3 +272,28 @@ def test_a_change_must_explain_more_than_is_left_in_its_runs(
     data, candidates = planted([change], np.array([[size, 0.0]]))
     found = approximations(traced(data, candidates, [0]), NAMES, [])
     assert found == ({0: Approximation()} if doubted else {})
+
+
+SHAPES = [effect("stribeck_friction", stribeck_speed=speed) for speed in (0.1, 0.2)]
+
+
+@pytest.mark.parametrize(
+    ("effects", "chosen", "doubted"),
+    [
+        ([effect("viscous_friction"), effect("stribeck_friction")], [0], {0}),
+        ([effect("viscous_friction"), effect("elasticity")], [0], {0}),  # of several quantities
+        ([effect("viscous_friction"), effect("armature")], [0], set()),  # not of speed
+        (SHAPES, [0], set()),  # another shape of what is chosen
+        ([effect("viscous_friction"), effect("stribeck_friction")], [], set()),
+    ],
+)
+def test_whether_what_cannot_be_makes_a_name_doubtful(
+    effects: list[Effect], chosen: list[int], doubted: set[int]
+) -> None:
+    """It explains much more than what is chosen."""
+    data, candidates = planted(effects, np.array([[1.0, 0.0], [9.0, 0.0]]))
+    there = traced(data, candidates, chosen, all_but(1))
+    assert set(approximations(there, NAMES, [])) == doubted
+    rests = [left("a", "v[a]", "time", share=0.95)]
+    found = approximations(there, NAMES, rests)
+    assert found == (dict.fromkeys(chosen, function_of("v[a]", "time"))), "told before a rival"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import null_space
 
-from excite_cli.diagnosis.modelled_run import Model, width_of
+from excite_cli.diagnosis.modelled_run import Model
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.regressor import Regressor, standard_parameters
 from excite_cli.effects.catalogue import catalogue
@@ -20,7 +20,7 @@ def model() -> Model:
     return Model(robot, find_base_parameters(robot), (), None)
 
 
-def test_the_fit_and_its_inertias_give_the_same_torque(model: Model) -> None:
+def test_of_all_inertias_that_agree_the_nearest_is_taken(model: Model) -> None:
     """Parameters of effects follow the inertial ones and do not matter."""
     base, robot = model.base, model.robot
     fitted = np.random.default_rng(1).normal(size=base.rank)
@@ -28,11 +28,8 @@ def test_the_fit_and_its_inertias_give_the_same_torque(model: Model) -> None:
     assert np.array_equal(phi, model.full_inertias(fitted))
     y = Regressor(robot).evaluate(*robot.draw_states(20, 5))
     assert y @ phi == pytest.approx(y[..., base.selection] @ fitted, abs=1e-8)
-
-
-def test_of_all_inertias_that_agree_the_nearest_is_taken(model: Model) -> None:
-    """Against least squares over all changes that no torque shows."""
-    base, robot = model.base, model.robot
+    # Of all inertias that agree the nearest is taken. Against least squares over all changes that
+    # no torque shows.
     cad = standard_parameters(robot)
     fitted = base.mapping @ cad + np.random.default_rng(2).normal(size=base.rank)
     std = inertial_prior(robot, cad, 1.0).std
@@ -40,18 +37,7 @@ def test_of_all_inertias_that_agree_the_nearest_is_taken(model: Model) -> None:
     free = null_space(base.mapping)
     moved = np.linalg.lstsq(free / std[:, None], (cad - some) / std, rcond=None)[0]
     assert model.full_inertias(fitted) == pytest.approx(some + free @ moved, abs=1e-7)
-
-
-def test_what_the_urdf_says_already_changes_nothing(model: Model) -> None:
-    cad = standard_parameters(model.robot)
-    assert model.full_inertias(model.base.mapping @ cad) == pytest.approx(cad, abs=1e-9)
-
-
-def test_widths_are_those_of_linear_parameters(model: Model) -> None:
-    effects = tuple(catalogue()[kind]((0,)) for kind in ("spring", "armature", "payload"))
-    assert width_of(effects) == 2 + 1 + 10
-    assert replace(model, declared=effects).declared_width == 13
-    assert model.declared_width == 0
+    assert model.full_inertias(base.mapping @ cad) == pytest.approx(cad, abs=1e-9)
 
 
 @pytest.mark.parametrize("kept", [False, True])

@@ -43,9 +43,32 @@ def separate() -> NextMotion:
     return plan_after(make_diagnosis(), smoke_spec(), CONFIG.parent)
 
 
-@pytest.fixture(scope="module")
-def separating(separate: NextMotion) -> Result:
-    return run(separate)
+def test_the_motion_tells_the_pair_apart(separate: NextMotion) -> None:
+    """Better than one that only excites, and best of all once the solver has worked on it."""
+    assert separate.purpose == "separate"
+    assert "separates what the data cannot: viscous_friction on elbow" in separate.messages[0]
+    result = run(separate)
+    (motion,) = result.motions
+    outlook = separate.outlook([motion.coefficients])
+    assert outlook["expected_kl"] > 3 > outlook["pairs"][0]["kl_so_far"]
+    assert outlook["pairs"][0]["motions_needed"] == 1
+    assert motion.improved
+    (excited,) = run(plan_after(make_diagnosis(rivals=()), smoke_spec(), CONFIG.parent)).motions
+    assert outlook["expected_kl"] > 1.3 * separate.outlook([excited.coefficients])["expected_kl"]
+    longer = plan_after(make_diagnosis(), smoke_spec("optimizer.max_iterations=15"), CONFIG.parent)
+    (solved,) = run(longer).motions
+    assert longer.outlook([solved.coefficients])["expected_kl"] > 60
+    for each in (motion, solved):
+        margins = worst_margins(separate.model, each.coefficients, 700.0)
+        assert all(worst.violations == 0 for worst in margins.values())
+    # The result belongs to the model without rivals.
+    assert result.effect_names == ("viscous_friction[elbow].viscous",)
+    block = separate.model.objective().block(motion.coefficients)
+    whole = np.vstack([separate.prior.factor, block])
+    assert np.allclose(result.stack.factor.T @ result.stack.factor, whole.T @ whole)
+    assert motion.stacked_condition_number == pytest.approx(np.linalg.cond(whole), rel=1e-6)
+    assert "viscous_friction" in result.config
+    assert "nonlinear" not in result.config
 
 
 def _least_squares(rows: np.ndarray, truth: np.ndarray, free: list[int]) -> float:
@@ -86,43 +109,6 @@ def test_divergence_so_far_is_that_of_the_rows_themselves(separate: NextMotion) 
     assert expected < 3
 
 
-def test_the_motion_tells_the_pair_apart(separate: NextMotion, separating: Result) -> None:
-    assert separate.purpose == "separate"
-    assert "separates what the data cannot: viscous_friction on elbow" in separate.messages[0]
-    (motion,) = separating.motions
-    outlook = separate.outlook([motion.coefficients])
-    assert outlook["expected_kl"] > 3 > outlook["pairs"][0]["kl_so_far"]
-    assert outlook["pairs"][0]["motions_needed"] == 1
-    assert motion.improved
-    margins = worst_margins(separate.model, motion.coefficients, 700.0)
-    assert all(worst.violations == 0 for worst in margins.values())
-
-
-def test_it_separates_better_than_the_motion_that_only_excites(
-    separate: NextMotion, separating: Result
-) -> None:
-    excited = run(plan_after(make_diagnosis(rivals=()), smoke_spec(), CONFIG.parent))
-    found, other = (
-        separate.outlook([result.motions[0].coefficients])["expected_kl"]
-        for result in (separating, excited)
-    )
-    assert found > 1.3 * other
-
-
-def test_the_result_belongs_to_the_model_without_rivals(
-    separate: NextMotion, separating: Result
-) -> None:
-    assert separating.effect_names == ("viscous_friction[elbow].viscous",)
-    objective = separate.model.objective()
-    block = objective.block(separating.motions[0].coefficients)
-    whole = np.vstack([separate.prior.factor, block])
-    assert np.allclose(separating.stack.factor.T @ separating.stack.factor, whole.T @ whole)
-    stacked = separating.motions[0].stacked_condition_number
-    assert stacked == pytest.approx(np.linalg.cond(whole), rel=1e-6)
-    assert "viscous_friction" in separating.config
-    assert "nonlinear" not in separating.config
-
-
 def test_without_aliases_it_excites_on_top_of_the_data() -> None:
     planned = plan_after(make_diagnosis([viscous(), SPRING], ()), smoke_spec(), CONFIG.parent)
     assert planned.purpose == "excite"
@@ -133,6 +119,13 @@ def test_without_aliases_it_excites_on_top_of_the_data() -> None:
     (motion,) = run(planned).motions
     assert motion.stacked_condition_number < 0.5 * np.linalg.cond(planned.prior.factor)
     assert planned.outlook([motion.coefficients]) == {"purpose": "excite", "pairs": []}
+    # The same torque in other words is not planned for. Coulomb friction of asymmetric friction and
+    # an offset: no motion can tell.
+    twin = EffectRecord("asymmetric_friction", ("elbow",), {}, (1.0, 1.0))
+    planned = plan_after(make_diagnosis([COULOMB], (twin,)), smoke_spec(), CONFIG.parent)
+    assert planned.purpose == "excite"
+    assert "no motion distinguishes the effects" in planned.messages[0]
+    assert any("no motion separates them" in message for message in planned.messages)
 
 
 def test_several_pairs_the_smallest_counts() -> None:
@@ -145,15 +138,6 @@ def test_several_pairs_the_smallest_counts() -> None:
     assert len(outlook["pairs"]) == 2
     assert outlook["expected_kl"] == min(pair["expected_kl"] for pair in outlook["pairs"])
     assert outlook["expected_kl"] > 3
-
-
-def test_the_same_torque_in_other_words_is_not_planned_for() -> None:
-    """Coulomb friction of asymmetric friction and an offset: no motion can tell."""
-    twin = EffectRecord("asymmetric_friction", ("elbow",), {}, (1.0, 1.0))
-    planned = plan_after(make_diagnosis([COULOMB], (twin,)), smoke_spec(), CONFIG.parent)
-    assert planned.purpose == "excite"
-    assert "no motion distinguishes the effects" in planned.messages[0]
-    assert any("no motion separates them" in message for message in planned.messages)
 
 
 @pytest.mark.parametrize(
@@ -173,31 +157,13 @@ def test_rivals_that_no_motion_excites_are_told(rival: EffectRecord, words: str)
     assert any(words in message for message in planned.messages)
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
+def test_diagnoses_that_do_not_fit() -> None:
+    made = make_diagnosis()
+    known = made.information
+    for change, words in (
         ({"fingerprint": "other"}, "another robot"),
-        ({"information": "noise"}, "no noise level"),
-        ({"information": "factor"}, "columns"),
-    ],
-)
-def test_diagnoses_that_do_not_fit(change: dict, words: str) -> None:
-    diagnosis = make_diagnosis()
-    information = diagnosis.information
-    if change.get("information") == "noise":
-        diagnosis = replace(diagnosis, information=replace(information, noise=np.zeros(5)))
-    elif change.get("information") == "factor":
-        cut = information.factor[:, :-1]
-        diagnosis = replace(diagnosis, information=replace(information, factor=cut))
-    else:
-        diagnosis = replace(diagnosis, **change)
-    with pytest.raises(FileError, match=words):
-        plan_after(diagnosis, smoke_spec(), CONFIG.parent)
-
-
-def test_the_solver_separates_within_the_constraints() -> None:
-    planned = plan_after(make_diagnosis(), smoke_spec("optimizer.max_iterations=15"), CONFIG.parent)
-    (motion,) = run(planned).motions
-    assert planned.outlook([motion.coefficients])["expected_kl"] > 60
-    margins = worst_margins(planned.model, motion.coefficients, 700.0)
-    assert all(worst.violations == 0 for worst in margins.values())
+        ({"information": replace(known, noise=np.zeros(5))}, "no noise level"),
+        ({"information": replace(known, factor=known.factor[:, :-1])}, "columns"),
+    ):
+        with pytest.raises(FileError, match=words):
+            plan_after(replace(made, **change), smoke_spec(), CONFIG.parent)

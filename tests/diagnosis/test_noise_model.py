@@ -37,32 +37,6 @@ def ljung_box(x: Array, lags: int = 20) -> float:
     return float(chi2.sf(n * (n + 2) * np.sum(r**2 / (n - np.arange(1, lags + 1))), lags))
 
 
-def without_nugget(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(noise_model, "_NUGGET", 0.0)
-
-
-def test_coefficients_of_an_autoregression_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    without_nugget(monkeypatch)
-    runs = [series(seed) for seed in range(3)]
-    found = fit_noise(runs, all_usable(runs))
-    taps = np.zeros(HIGHEST_ORDER)
-    taps[: len(found.coefficients[0])] = found.coefficients[0]
-    assert taps[:2] == pytest.approx(TAPS, abs=0.04)
-    assert np.abs(taps[2:]).max() < 0.04
-    assert found.sigma[0] == pytest.approx(SIGMA, rel=0.02)
-
-
-def test_whitened_noise_is_white_and_of_unit_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    without_nugget(monkeypatch)
-    runs = [series(seed) for seed in range(5)]
-    found = fit_noise(runs[:3], all_usable(runs[:3]))
-    for fresh in runs[3:]:  # not those it was fitted to
-        assert ljung_box(fresh[:, 0]) < 1e-12
-        white = found.whitened(fresh[:, 0], 0, np.ones(len(fresh), bool))
-        assert ljung_box(white) > 1e-3
-        assert white.std() == pytest.approx(1.0, abs=0.04)
-
-
 def test_white_noise_needs_no_coefficients_of_size() -> None:
     runs = [np.random.default_rng(k).normal(size=(2000, 2)) * [1.0, 5.0] for k in range(3)]
     found = fit_noise(runs, all_usable(runs))
@@ -82,7 +56,7 @@ def test_the_nugget_is_white_noise_added() -> None:
     assert modelled == pytest.approx(expected, rel=0.2)
 
 
-def test_a_band_without_noise_is_not_trusted_without_end() -> None:
+def test_slow_noise_is_no_less_than_white_noise_and_no_band_is_trusted_without_end() -> None:
     """Torque that somebody low-passed holds nothing at high frequency."""
     kernel = np.hanning(41) / np.hanning(41).sum()
     runs = [np.convolve(np.random.default_rng(k).normal(size=4000), kernel, "same")[:, None]
@@ -90,10 +64,8 @@ def test_a_band_without_noise_is_not_trusted_without_end() -> None:
     found = fit_noise(runs, all_usable(runs))
     modelled = spectrum(found.coefficients[0], found.sigma[0], np.linspace(0.1, 0.5, 50))
     assert modelled.min() > 0.01 * np.var(runs[0])
-
-
-def test_slow_noise_is_no_less_than_white_noise() -> None:
-    """Next to nothing of differentiated white noise is slow; a model takes slow noise up, too."""
+    # Slow noise is no less than white noise. Next to nothing of differentiated white noise is slow;
+    # a model takes slow noise up, too.
     runs = [np.diff(series(seed, taps=np.zeros(0)), axis=0) for seed in range(3)]
     found = fit_noise(runs, all_usable(runs))
     assert found.coefficients[0].sum() == pytest.approx(0.0, abs=1e-6)
@@ -113,9 +85,7 @@ def test_samples_that_are_not_usable_are_not_seen() -> None:
     assert plain.sigma == found.sigma
     full = fit_noise(runs, all_usable(runs))
     assert found.sigma == pytest.approx(full.sigma, rel=0.05)
-
-
-def test_short_series_are_taken_as_white_from_usable_samples_alone() -> None:
+    # Short series are taken as white from usable samples alone.
     runs = [series(seed, 40) for seed in range(2)]
     usable = [np.arange(40)[:, None] % 4 > 1 for _ in runs]  # no window is whole
     wild = [np.where(mask, run, 1e9) for run, mask in zip(runs, usable, strict=True)]
@@ -123,14 +93,10 @@ def test_short_series_are_taken_as_white_from_usable_samples_alone() -> None:
     kept = np.concatenate([run[mask] for run, mask in zip(runs, usable, strict=True)])
     assert found.sigma[0] == pytest.approx(np.sqrt(np.mean(kept**2)))
     assert len(found.coefficients[0]) == 0
-
-
-def test_a_joint_without_a_usable_sample_has_finite_noise() -> None:
-    runs = [series(0, 300)]
-    found = fit_noise(runs, [np.zeros(runs[0].shape, bool)])
-    assert np.isfinite(found.sigma).all()
-    assert found.sigma[0] > 0
-    assert found.whitened(runs[0][:, 0], 0, np.zeros(300, bool)).shape == (0,)
+    none = fit_noise(runs, [np.zeros(run.shape, bool) for run in runs])
+    assert np.isfinite(none.sigma).all()
+    assert none.sigma[0] > 0
+    assert none.whitened(runs[0][:, 0], 0, np.zeros(40, bool)).shape == (0,)
 
 
 def test_drifting_noise_gives_a_stable_model() -> None:
@@ -198,13 +164,6 @@ def test_more_noise_after_gaps_is_measured(larger: float, monkeypatch: pytest.Mo
     assert white[found.follow_gaps(usable[:, 0])].std() == pytest.approx(1.0, abs=0.15)
 
 
-@pytest.mark.parametrize("memory", [-0.9, 0.0, 0.5, 0.98])
-def test_level_of_a_first_order_process_is_known(memory: float) -> None:
-    """σ / √(1 − c²)."""
-    model = NoiseModel((np.array([memory]),), np.array([SIGMA]))
-    assert model.levels() == pytest.approx([SIGMA / np.sqrt(1 - memory**2)], rel=1e-6)
-
-
 def test_levels_are_those_of_each_joint() -> None:
     """A second-order process in closed form, a first-order one and independent samples."""
     model = NoiseModel((TAPS, np.array([0.8]), np.zeros(0)), np.array([SIGMA, 2.0, 5.0]))
@@ -213,6 +172,17 @@ def test_levels_are_those_of_each_joint() -> None:
     assert model.levels() == pytest.approx([SIGMA * np.sqrt(variance), 2.0 / 0.6, 5.0], rel=1e-6)
 
 
-def test_levels_are_those_of_a_long_series() -> None:
-    model = NoiseModel((TAPS,), np.array([SIGMA]))
-    assert model.levels()[0] == pytest.approx(series(8, 100_000).std(), rel=0.02)
+def test_an_autoregression_is_found_and_whitened(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(noise_model, "_NUGGET", 0.0)
+    runs = [series(seed) for seed in range(5)]
+    found = fit_noise(runs[:3], all_usable(runs[:3]))
+    taps = np.zeros(HIGHEST_ORDER)
+    taps[: len(found.coefficients[0])] = found.coefficients[0]
+    assert taps[:2] == pytest.approx(TAPS, abs=0.04)
+    assert np.abs(taps[2:]).max() < 0.04
+    assert found.sigma[0] == pytest.approx(SIGMA, rel=0.02)
+    for fresh in runs[3:]:  # not those it was fitted to
+        assert ljung_box(fresh[:, 0]) < 1e-12
+        white = found.whitened(fresh[:, 0], 0, np.ones(len(fresh), bool))
+        assert ljung_box(white) > 1e-3
+        assert white.std() == pytest.approx(1.0, abs=0.04)

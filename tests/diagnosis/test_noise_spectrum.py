@@ -40,10 +40,14 @@ def coloured(memory: float, seed: int, rate: float = 500.0) -> Array:
     return np.asarray(lfilter([1.0], [1.0, -memory], e))
 
 
-def test_white_noise_is_measured() -> None:
+def test_white_noise_is_measured_and_structure_is_none() -> None:
     found, rms = measured(coloured(0.0, 1))
     np.testing.assert_allclose(found.white, rms, rtol=0.2)
     np.testing.assert_allclose(found.coloured, rms, rtol=0.2)
+    # Structure below the band is no noise.
+    wave = 3.0 * np.sin(9.0 * np.arange(SECONDS * 500) / 500.0)
+    found, rms = measured(coloured(0.0, 2) + wave)
+    assert np.all(rms > 5.0 * found.coloured)
 
 
 @pytest.mark.parametrize("memory", [0.8, 0.93, 0.97])
@@ -56,20 +60,12 @@ def test_noise_with_a_memory_is_not_taken_for_more_than_noise(memory: float) -> 
     assert np.all(rms > 1.2 * found.white)
 
 
-def test_structure_below_the_band_is_no_noise() -> None:
-    wave = 3.0 * np.sin(9.0 * np.arange(SECONDS * 500) / 500.0)
-    found, rms = measured(coloured(0.0, 2) + wave)
-    assert np.all(rms > 5.0 * found.coloured)
-
-
-def test_torque_that_was_filtered_says_nothing_of_its_noise() -> None:
+def test_some_torques_say_nothing_of_their_noise() -> None:
     sections = butter(6, 9.0, fs=500.0, output="sos")
     found, _ = measured(sosfiltfilt(sections, coloured(0.0, 3)))
     assert np.isnan(found.white).all()
     assert np.isnan(found.coloured).all()
-
-
-def test_slow_recordings_say_nothing_of_their_noise() -> None:
+    # Slow recordings say nothing of their noise.
     found, _ = measured(coloured(0.0, 3, 40.0), 40.0)
     assert np.isnan(found.white).all()
 

@@ -11,8 +11,7 @@ from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.own_torque import at_its_own_torque
 from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.robot.model import Array
-from tests.diagnosis.test_final_fit import one
-from tests.diagnosis.test_misspecification import planted, traced
+from tests.diagnosis.explicit_data import effect, planted, traced
 
 
 @pytest.mark.parametrize("gain", [0.1, -0.3, 0.6])
@@ -20,7 +19,7 @@ def test_a_gain_of_what_is_found_beside_it_is_fitted_as_it_predicts(
     monkeypatch: pytest.MonkeyPatch, gain: float
 ) -> None:
     """τ = (1 + g) (c₁ f + c₂ h): the gain's column is what the other two are in the last fit."""
-    effects = [one("viscous_friction"), one("armature"), one("torque_gain")]
+    effects = [effect("viscous_friction"), effect("armature"), effect("torque_gain")]
     data, candidates = planted(effects, np.zeros((3, 2)))
     first, second = (c.columns for c in candidates[:2])
     whole = [3.0 * f + 1.0 * h for f, h in zip(first, second, strict=True)]

@@ -57,12 +57,15 @@ def test_a_noise_model_that_fits_is_hardly_inflated(memory: float) -> None:
 
 def test_noise_taken_for_white_is_inflated() -> None:
     """Slow columns explain slow noise: the excess is the ratio of its spectrum at frequency zero
-    to its variance, (1 + c)/(1 − c) = 19 and less where the columns are not that slow."""
+    to its variance, (1 + c)/(1 − c) = 19 and less where the columns are not that slow.
+    """
     data, candidates = data_with_memory(0.9)
     plain = data.evidence([], NoiseModel.white(np.ones(2)))
     rest = np.concatenate(data.residuals([], (), plain.solve(())))
     found = inflation(data, candidates, NoiseModel.white(rest.std(axis=0)))
     assert 5.0 < found < 25.0
+    # Few placebos say nothing.
+    assert inflation(data, candidates[:1], NoiseModel.white(np.full(2, 0.1))) == 1.0
 
 
 def test_gains_are_those_of_a_chi_square_law() -> None:
@@ -87,8 +90,3 @@ def test_an_effect_that_is_in_the_model_is_not_in_the_residual() -> None:
     without = placebos_of(data, candidates, (), noise, white).inflation
     assert without > 50
     assert placebos_of(data, candidates, (0,), noise, white).inflation < 1.7
-
-
-def test_few_placebos_say_nothing() -> None:
-    data, candidates = data_with_memory(0.9)
-    assert inflation(data, candidates[:1], NoiseModel.white(np.full(2, 0.1))) == 1.0

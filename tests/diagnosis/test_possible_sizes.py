@@ -1,5 +1,7 @@
 """Signs and sizes that physics allows, rule by rule, and whose parameters are looked at."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -15,16 +17,6 @@ from excite_cli.robot.model import Array
 
 # A robot on which no size is absurd.
 LARGE = Seen(np.full(2, 1e12), np.zeros(2), 40.0)
-NONNEGATIVE = (
-    "viscous_friction", "coulomb_friction", "nonlinear_viscous_friction", "stribeck_friction",
-    "load_dependent_friction", "armature", "elasticity",
-)  # fmt: skip
-# Of those with several parameters, which cannot be negative.
-SOME_NONNEGATIVE = {
-    "asymmetric_friction": (0, 1), "coupled_friction": (1,), "spring": (0,),
-    "ripple": (), "cable_force": (), "contact": (),
-}  # fmt: skip
-WHOLE = ("torque_saturation", "backlash")
 # Candidates of 1, 2, 10, 1 and 3 columns, and values with which each is possible.
 MIXED = ("viscous_friction", "coupled_friction", "payload", "encoder_offset", "cable_force")
 
@@ -50,14 +42,6 @@ def possible(
     return allowed(np.array([-1.0, -1e9, 7.0, *values]), [0], [0])
 
 
-@pytest.mark.parametrize("kind", NONNEGATIVE)
-def test_friction_and_inertia_are_never_negative(kind: str) -> None:
-    assert possible(kind, 1e-9)
-    assert possible(kind, 0.0)
-    assert possible(kind, 1e9)  # how large depends on the robot
-    assert not possible(kind, -1e-9)
-
-
 def test_friction_that_depends_on_the_angle_takes_no_more_than_there_is() -> None:
     """Of Coulomb friction of its joint, declared or found: friction is nowhere negative."""
     kinds = [("coulomb_friction", (0,)), ("coulomb_friction", (1,)), ("position_friction", (1,))]
@@ -78,13 +62,6 @@ def test_friction_that_depends_on_the_angle_takes_no_more_than_there_is() -> Non
             assert not allowed([-1.0, 1.0, 99.0, 5.0, *at], [2])
 
 
-@pytest.mark.parametrize("kind", NONNEGATIVE)
-def test_a_wrong_sign_of_a_single_parameter_is_refused_whatever_its_error(kind: str) -> None:
-    """Within its error it is nothing."""
-    assert not possible(kind, -0.1, error=1.0)
-    assert not possible(kind, -9.0, error=1.0)
-
-
 def test_a_payload_is_refused_where_no_body_is_near() -> None:
     """The inertia of a real one of 2.7 kg came out at -0.007 kg·m², a third of one deviation."""
     _, sphere = Payload.planted(2.7, {})
@@ -99,18 +76,12 @@ def test_a_payload_is_refused_where_no_body_is_near() -> None:
     assert not possible("payload", *plate, error=2.0)  # and within the error, it is nothing
 
 
-@pytest.mark.parametrize(
-    ("kind", "value"),
-    [("coulomb_friction", 1.0), ("stribeck_friction", 1.0), ("torque_offset", -1.0)],
-)
-def test_no_part_of_a_torque_is_larger_than_the_torque(kind: str, value: float) -> None:
-    robot = Seen(np.array([80.0, 1e6]), np.ones(2), 30.0)
-    assert possible(kind, 79.9 * value, seen=robot)
-    assert not possible(kind, 80.1 * value, seen=robot)
-
-
 def test_absurd_sizes_are_told_with_their_reason() -> None:
     robot = Seen(np.full(2, 80.0), np.array([20.0, 1.0]), 30.0)
+    for kind in ("coulomb_friction", "stribeck_friction", "torque_offset"):
+        sign = -1.0 if kind == "torque_offset" else 1.0
+        assert possible(kind, 79.9 * sign, seen=robot)
+        assert not possible(kind, 80.1 * sign, seen=robot), "no part exceeds the whole torque"
     _, heavy = Payload.planted(31.0, {})
     for kind, values, words in (
         ("payload", heavy / 1e3, "next to nothing"),
@@ -130,25 +101,6 @@ def test_absurd_sizes_are_told_with_their_reason() -> None:
     assert possible("contact", 3.0, 0.0, 0.0, seen=robot)
 
 
-@pytest.mark.parametrize("kind", SOME_NONNEGATIVE)
-def test_of_several_parameters_those_that_are_sizes_are_never_negative(kind: str) -> None:
-    width = len(catalogue()[kind].parameters)
-    for at in range(width):
-        values = np.ones(width)
-        values[at] = -1.0
-        assert possible(kind, *values) == (at not in SOME_NONNEGATIVE[kind])
-
-
-def test_one_negative_parameter_of_several_is_enough() -> None:
-    assert possible("coupled_friction", 1.0, 2.0, joints=(0, 1))
-    assert possible("coupled_friction", -1.0, 2.0, joints=(0, 1))  # rods move with each other
-    assert possible("coupled_friction", -7.9, 2.0, joints=(0, 1))
-    assert not possible("coupled_friction", -8.1, 2.0, joints=(0, 1))
-    assert not possible("coupled_friction", 1.0, -2.0, joints=(0, 1))
-    assert possible("spring", 1.0, -2.0)  # a preload pulls either way
-    assert not possible("spring", -1.0, 2.0)
-
-
 def test_friction_drifts_as_a_whole() -> None:
     """Of opposite signs, rates are possible as far as one of them is zero within its error."""
     for sign in (-1.0, 1.0):
@@ -157,45 +109,6 @@ def test_friction_drifts_as_a_whole() -> None:
         assert not possible("friction_drift", sign * 2.0, -sign * 1e-9)
         assert possible("friction_drift", sign * 2.0, -sign * 0.3, error=0.15)
         assert not possible("friction_drift", sign * 2.0, -sign * 0.6, error=0.15)
-
-
-@pytest.mark.parametrize("kind", ["torque_offset", "ripple", "cable_force", "friction_drift"])
-def test_what_has_no_sign_and_no_limit_may_be_anything(kind: str) -> None:
-    width = len(catalogue()[kind].parameters)
-    assert possible(kind, *[-1e6] * width)
-    assert possible(kind, *[1e6] * width)
-
-
-@pytest.mark.parametrize(
-    ("kind", "high"),
-    [("encoder_offset", 0.2), ("torque_gain", 0.5), ("torque_delay", 0.1), ("base_tilt", 0.2)],
-)
-def test_sizes_that_do_not_depend_on_the_robot_have_limits(kind: str, high: float) -> None:
-    several, width = (0, 1), len(catalogue()[kind].parameters)
-    for sign in (-1.0, 1.0):
-        for at in range(width):
-            values = np.zeros(width)
-            values[at] = sign * high * 0.999
-            assert possible(kind, *values, joints=several)
-            values[at] = sign * high * 1.001
-            assert not possible(kind, *values, joints=several)
-
-
-def test_one_joint_alone_is_late_by_more_than_a_moment() -> None:
-    assert not possible("torque_delay", 1.49e-3)
-    assert not possible("torque_delay", -5e-3)
-    assert possible("torque_delay", 1.51e-3)
-    assert possible("torque_delay", 4e-4, joints=(0, 1))
-    assert not possible("torque_delay", 2e-4, joints=(0, 1))
-
-
-@pytest.mark.parametrize("kind", WHOLE)
-def test_what_is_one_by_nature_is_near_one(kind: str) -> None:
-    assert possible(kind, 0.6)
-    assert possible(kind, 1.5)
-    assert not possible(kind, 0.59)
-    assert not possible(kind, 1.51)
-    assert not possible(kind, -1.0)
 
 
 @settings(max_examples=100, deadline=None, derandomize=True)
@@ -219,3 +132,45 @@ def test_only_the_added_are_judged_each_by_its_own_parameters(
     values[wrong][0] = -5.0
     found = allowed(np.concatenate([declared, *(values[i] for i in chosen)]), chosen, added)
     assert found == (wrong not in added or MIXED[wrong] == "cable_force")
+
+
+@pytest.mark.parametrize("kind", [
+    "viscous_friction", "coulomb_friction", "nonlinear_viscous_friction", "stribeck_friction",
+    "load_dependent_friction", "armature", "elasticity",
+])  # fmt: skip
+def test_friction_and_inertia_are_never_negative(kind: str) -> None:
+    """Whatever their error, within which they are nothing; how large depends on the robot."""
+    assert all(possible(kind, value) for value in (0.0, 1e-9, 1e9))
+    assert not possible(kind, -1e-9)
+    assert not possible(kind, -0.1, error=1.0)
+    assert not possible(kind, -9.0, error=1.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "joints", "good", "bad"),
+    [
+        ("torque_delay", (0,), [1.51e-3], [1.49e-3, -5e-3]),  # one joint alone
+        ("torque_delay", (0, 1), [4e-4], [2e-4]),
+        ("torque_delay", (0, 1), [0.0999, -0.0999], [0.1001, -0.1001]),
+        ("encoder_offset", (0, 1), [0.1998, -0.1998], [0.2002, -0.2002]),
+        ("torque_gain", (0, 1), [0.4995, -0.4995], [0.5005, -0.5005]),
+        ("base_tilt", (0, 1), [(0.1998, 0), (0, -0.1998)], [(-0.2002, 0), (0, 0.2002)]),
+        ("torque_saturation", (0,), [0.6, 1.5], [0.59, 1.51, -1.0]),  # one by nature
+        ("backlash", (0,), [0.6, 1.5], [0.59, 1.51, -1.0]),
+        ("coupled_friction", (0, 1), [(1, 2), (-1, 2), (-7.9, 2)], [(-8.1, 2), (1, -2)]),
+        ("spring", (0,), [(1, 1), (1, -2)], [(-1, 1), (-1, 2)]),  # a preload pulls either way
+        ("asymmetric_friction", (0,), [(1, 1)], [(-1, 1), (1, -1)]),
+        ("torque_offset", (0,), [-1e6, 1e6], []),  # neither sign nor limit
+        ("ripple", (0,), [(-1, 1), (1, -1), (-1e6, -1e6), (1e6, 1e6)], []),
+        ("cable_force", (0,), [(-1, 1, 1), (1, 1, -1), (-1e6,) * 3, (1e6,) * 3], []),
+        ("contact", (0,), [(-1, 1, 1), (1, -1, 1), (1, 1, -1)], []),
+        ("friction_drift", (0,), [(-1e6, -1e6), (1e6, 1e6)], []),
+    ],
+)
+def test_signs_and_limits(
+    kind: str, joints: tuple[int, ...], good: list[Any], bad: list[Any]
+) -> None:
+    for values in good:
+        assert possible(kind, *np.atleast_1d(values), joints=joints), values
+    for values in bad:
+        assert not possible(kind, *np.atleast_1d(values), joints=joints), values

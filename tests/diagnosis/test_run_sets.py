@@ -41,12 +41,16 @@ def test_the_first_set_is_the_best_of_all_there_are() -> None:
     ]
     best = found.explained(masks(everything)).max()
     assert found.explained(masks(run_sets(found)[:1]))[0] == pytest.approx(best)
-
-
-def test_two_loads_are_told_apart() -> None:
-    found, *_ = evidence({2: 1.0, 4: 3.0})
-    sets = run_sets(found)
-    assert {(4,), (2, 4)} <= set(sets)
+    # Two loads are told apart noise is none and one run tells nothing.
+    two, *_ = evidence({2: 1.0, 4: 3.0})
+    assert {(4,), (2, 4)} <= set(run_sets(two))
+    either_sign, *_ = evidence(dict.fromkeys(range(1, RUNS), 1.0), positive=False)
+    assert run_sets(either_sign)[0] == (0,), "it is in the fewer runs"
+    none, *_ = evidence({}, noise=1.0)
+    assert run_sets(none) == []
+    assert run_sets(RunEvidence(np.ones((1, 1, 1)), np.ones((1, 1)), True)) == []
+    # Tests grow with the runs.
+    assert [sets_looked_at(n) for n in (1, 2, 10)] == [1, 4, 28]
 
 
 def test_explained_is_what_values_of_their_own_take_off() -> None:
@@ -62,25 +66,6 @@ def test_explained_is_what_values_of_their_own_take_off() -> None:
     residuals = [r / scale for r in residuals]
     expected = left(list(range(RUNS))) - left([1, 4]) - left([0, 2, 3, 5, 6])
     assert found.explained(masks([(1, 4)]))[0] == pytest.approx(expected, rel=1e-5)
-
-
-def test_what_may_be_negative_is_in_the_fewer_runs() -> None:
-    found, *_ = evidence(dict.fromkeys(range(1, RUNS), 1.0), positive=False)
-    assert run_sets(found)[0] == (0,)
-
-
-def test_noise_proposes_nothing() -> None:
-    found, *_ = evidence({}, noise=1.0)
-    assert run_sets(found) == []
-
-
-def test_one_run_tells_nothing() -> None:
-    found = RunEvidence(np.ones((1, 1, 1)), np.ones((1, 1)), True)
-    assert run_sets(found) == []
-
-
-def test_tests_grow_with_the_runs() -> None:
-    assert [sets_looked_at(n) for n in (1, 2, 10)] == [1, 4, 28]
 
 
 def test_sets_that_differ_in_one_run_are_weighed_as_each_alone() -> None:

@@ -1,5 +1,6 @@
 """Which pass of a diagnosis is the answer, with passes that find what they are told to find."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,10 +11,10 @@ from excite_cli.config.data_spec import DiagnosisSpec
 from excite_cli.diagnosis import search_loop
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.identification.declared_states import LeftOut
-from tests.diagnosis.explicit_data import anything, effect
-from tests.diagnosis.test_misspecification import planted
+from tests.diagnosis.explicit_data import anything, effect, on_joint_0, planted
 
 
 class Fit(SimpleNamespace):
@@ -135,6 +136,12 @@ def test_a_cut_leaves_what_is_beside_it() -> None:
     rest = search_loop.beside_cuts(search_loop.Fit(np.zeros(10), effects, values, np.ones(4), 1.0))
     assert rest.effects == (effects[0], effects[2])
     assert rest.values.tolist() == [0.5, 0.6, *sizes[0] * [0], *sizes[2] * [2]]
+    # A search without cuts knows no kind of them.
+    cut = catalogue()["torque_saturation"]((1,), {"level": 3.0})
+    blind = search_loop._without_kinds(DiagnosisSpec(exclude=["backlash"]), [cut])
+    assert (blind.exclude, blind.rounds) == (["backlash", "torque_saturation"], 60)
+    alone = DiagnosisSpec(kinds=["torque_saturation"])
+    assert search_loop._without_kinds(alone, [cut]).rounds == 0
 
 
 def test_what_is_beside_a_cut_is_looked_for_without_its_samples(
@@ -146,14 +153,6 @@ def test_what_is_beside_a_cut_is_looked_for_without_its_samples(
     assert began == ["declared", "rest", "clean", "rest", "clean", "cut5.1"]
 
 
-def test_a_search_without_cuts_knows_no_kind_of_them() -> None:
-    cut = catalogue()["torque_saturation"]((1,), {"level": 3.0})
-    blind = search_loop._without_kinds(DiagnosisSpec(exclude=["backlash"]), [cut])
-    assert (blind.exclude, blind.rounds) == (["backlash", "torque_saturation"], 60)
-    alone = DiagnosisSpec(kinds=["torque_saturation"])
-    assert search_loop._without_kinds(alone, [cut]).rounds == 0
-
-
 def test_a_pass_that_is_cut_short_keeps_what_the_pass_before_it_found() -> None:
     """At once over, the search alone knows the textbook's offset, and no spring."""
     effects = [effect("spring"), effect("torque_offset")]
@@ -163,3 +162,32 @@ def test_a_pass_that_is_cut_short_keeps_what_the_pass_before_it_found() -> None:
     for found, named in ((), [1]), ((0, 1), [0, 1]):
         judge = Judgement(plain, plain, candidates, Rules(0.01, 0.01), anything, found)
         assert sorted(search_loop._searched(judge, 60, data, model, lambda: True)) == named
+
+
+def fit_of(*effects: Effect) -> search_loop.Fit:
+    return search_loop.Fit(np.zeros(10), effects, np.zeros(len(effects)), np.ones(2), 100.0)
+
+
+def test_a_fit_is_settled_once_its_shapes_are() -> None:
+    """Energies are in units of the noise that is left: they say nothing of a shape that moved."""
+    one = fit_of(effect("ripple", periods=20.0), effect("spring"))
+    for periods, settled in ((20.4, True), (21.2, False), (30.0, False)):
+        assert one.close_to(fit_of(effect("ripple", periods=periods), effect("spring"))) == settled
+    assert not one.close_to(replace(one, energy=101.0))
+    assert not one.close_to(replace(one, levels=np.array([1.0, 1.1])))
+
+
+def test_noise_is_measured_in_the_shape_that_leaves_least() -> None:
+    """The second of three shapes of the excess is the true one; the first was found before."""
+    effects = [
+        effect("viscous_friction"),
+        effect("stribeck_friction", stribeck_speed=0.1),
+        effect("stribeck_friction", stribeck_speed=0.13),
+        effect("stribeck_friction", stribeck_speed=0.2),
+    ]
+    mix = np.eye(4)
+    mix[2, [1, 3]] = 2.0  # both have some of the true one
+    data, candidates = planted(effects, on_joint_0([1.0, 0.0, 3.0, 0.0]), mix)
+    plain = data.evidence(candidates, NoiseModel.white(np.ones(2)))
+    assert search_loop._of_best_shapes(plain, candidates, [0, 1]) == [0, 2]
+    assert search_loop._of_best_shapes(plain, candidates, [0]) == [0]

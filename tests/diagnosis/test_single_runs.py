@@ -16,8 +16,7 @@ from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.identification.split import Split
 from excite_cli.measurement.dataset import Run
 from excite_cli.measurement.run_identity import Part, RunId
-from tests.diagnosis.explicit_data import prepared
-from tests.diagnosis.test_misspecification import traced
+from tests.diagnosis.explicit_data import prepared, traced
 
 JOINTS = ("a", "b")
 
@@ -69,8 +68,6 @@ def test_by_what_two_recordings_differ_is_told_in_one_line() -> None:
     assert told.kind == "runs_differ"
     assert re.search(r"a and b differ: torque_offset of elbow by \+[45]\.\d* N·m in a\.", told.text)
     assert "runs: {a: {torque_offset: a}, b: {torque_offset: b}}" in told.text
-
-
-def test_what_is_chance_is_not_told_nor_what_parts_of_one_recording_differ_by() -> None:
+    # What is chance is not told nor what parts of one recording differ by.
     assert differences_between_runs(two_recordings(0.0)) == ()
     assert differences_between_runs(two_recordings(5.0, ("a", "a"))) == ()

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.diagnosis import sufficient as sufficient_
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
@@ -17,34 +16,23 @@ from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.diagnosis.sufficient import those_that_matter, with_everyday
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.seen import Seen
-from excite_cli.robot.model import Array, Robot, build_robot
-from tests.diagnosis.test_extrapolation import FAST, SLOW, TORQUE, crept, kind, made, usual
+from excite_cli.robot.model import Array
+from tests.diagnosis.test_extrapolation import FAST, ROBOT, SLOW, TORQUE, crept, kind, made, usual
 
 WITHOUT_INERTIAS: Any = SimpleNamespace(base=SimpleNamespace(selection=[]), declared=())
 
 
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return build_robot(RobotSpec(urdf="example-robot-data:ur5"))
-
-
-def found_with(
-    robot: Robot,
-    seen: Signals,
-    effects: Sequence[Effect],
-    tau: Array,
-    level: float,
-) -> SearchResult:
+def found_with(seen: Signals, effects: Sequence[Effect], tau: Array, level: float) -> SearchResult:
     """The first of these was found, beside noise of this level [N·m]."""
-    data, candidates = made(robot, seen, effects, tau)
-    noise = NoiseModel.white(np.full(robot.n, level))
+    data, candidates = made(seen, effects, tau)
+    noise = NoiseModel.white(np.full(ROBOT.n, level))
     evidence = data.evidence(candidates, noise)
-    seen_sizes = Seen(np.full(robot.n, 9.0), np.ones(robot.n), 1.0)
+    seen_sizes = Seen(np.full(ROBOT.n, 9.0), np.ones(ROBOT.n), 1.0)
     sizes = PossibleSizes(candidates, evidence.covariance, seen_sizes)
     judge = Judgement(evidence, evidence, candidates, Rules(0.01, 0.01), sizes)
     return SearchResult(
-        data, tuple(candidates), noise, judge, (0,), np.zeros(0), (), np.full(robot.n, level),
-        1.0, sizes, WITHOUT_INERTIAS, usual(robot, seen),
+        data, tuple(candidates), noise, judge, (0,), np.zeros(0), (), np.full(ROBOT.n, level),
+        1.0, sizes, WITHOUT_INERTIAS, usual(seen),
     )  # fmt: skip
 
 
@@ -65,11 +53,10 @@ def noisy(seen: Signals, inertia: float, level: float) -> Array:
     ],
 )
 def test_a_rotor_stays_unless_it_surely_does_not_matter(
-    robot: Robot, fastest: float, inertia: float, level: float, stays: bool
+    fastest: float, inertia: float, level: float, stays: bool
 ) -> None:
-    seen = crept(robot, fastest)
+    seen = crept(fastest)
     given = found_with(
-        robot,
         seen,
         [kind("coulomb_friction"), kind("armature")],
         noisy(seen, inertia, level),
@@ -77,47 +64,6 @@ def test_a_rotor_stays_unless_it_surely_does_not_matter(
     )
     assert with_everyday(given, [0]) == ([0, 1] if stays else [0])
     assert those_that_matter(given, [0, 1]) == ([0, 1] if stays else [0])
-
-
-def test_what_is_not_of_every_robot_is_left_alone(robot: Robot) -> None:
-    seen = crept(robot, FAST)
-    given = found_with(
-        robot, seen, [kind("coulomb_friction"), kind("spring")], noisy(seen, 0.0, 0.1), 0.1
-    )
-    assert with_everyday(given, [0]) == [0]
-    assert those_that_matter(replace(given, chosen=(0, 1)), [0, 1]) == [0, 1]
-
-
-def test_what_the_chosen_ones_have_among_their_columns_does_not_join(robot: Robot) -> None:
-    seen = crept(robot, SLOW)
-    effects = [kind("asymmetric_friction"), kind("coulomb_friction")]
-    given = found_with(robot, seen, effects, TORQUE * np.sign(seen.v), 1.0)
-    assert with_everyday(given, [0]) == [0]
-
-
-def test_nor_does_an_offset(robot: Robot) -> None:
-    seen = crept(robot, SLOW)
-    effects = [kind("coulomb_friction"), kind("torque_offset")]
-    given = found_with(robot, seen, effects, TORQUE * np.sign(seen.v) + 1.0, 1.0)
-    assert with_everyday(given, [0]) == [0]
-
-
-@pytest.mark.parametrize(("viscous", "stays"), [(-20.0, False), (20.0, True)])
-def test_nor_what_would_be_negative(robot: Robot, viscous: float, stays: bool) -> None:
-    seen = crept(robot, SLOW)
-    effects = [kind("coulomb_friction"), kind("viscous_friction")]
-    tau = TORQUE * np.sign(seen.v) + viscous * seen.v
-    given = found_with(robot, seen, effects, tau, 1e-3)
-    assert with_everyday(given, [0]) == ([0, 1] if stays else [0])
-
-
-def test_others_may_say_the_same_without_it(robot: Robot) -> None:
-    """Two columns that are alike: either leaves, as the other takes all of it."""
-    seen = crept(robot, FAST)
-    effects = [kind("coulomb_friction"), kind("armature"), kind("armature")]
-    given = found_with(robot, seen, effects, noisy(seen, 1.0, 0.1), 0.1)
-    twice = replace(given, chosen=(0, 1, 2))
-    assert len(those_that_matter(twice, twice.chosen)) == 2
 
 
 @pytest.mark.parametrize(
@@ -146,3 +92,32 @@ def test_what_single_runs_carry_stays_beside_the_textbook_if_its_own_seconds_mis
         difference=lambda one, other: no_better, missed=lambda chosen, rest, rows: missed
     )
     assert sufficient_.sufficient(traced, models) == answer
+
+
+@pytest.mark.parametrize(
+    ("kinds", "offset", "viscous", "level", "joins"),
+    [
+        (("asymmetric_friction", "coulomb_friction"), 0.0, 0.0, 1.0, False),  # it has its columns
+        (("coulomb_friction", "torque_offset"), 1.0, 0.0, 1.0, False),
+        (("coulomb_friction", "viscous_friction"), 0.0, 20.0, 1e-3, True),
+        (("coulomb_friction", "viscous_friction"), 0.0, -20.0, 1e-3, False),  # it is impossible
+    ],
+)
+def test_whether_another_joins_what_was_found(
+    kinds: tuple[str, ...], offset: float, viscous: float, level: float, joins: bool
+) -> None:
+    seen = crept(SLOW)
+    tau = TORQUE * np.sign(seen.v) + offset + viscous * seen.v
+    given = found_with(seen, [kind(each) for each in kinds], tau, level)
+    assert with_everyday(given, [0]) == ([0, 1] if joins else [0])
+
+
+def test_what_is_not_of_every_robot_is_left_alone_and_one_of_two_alike_leaves() -> None:
+    seen = crept(FAST)
+    spring = [kind("coulomb_friction"), kind("spring")]
+    given = found_with(seen, spring, noisy(seen, 0.0, 0.1), 0.1)
+    assert with_everyday(given, [0]) == [0]
+    assert those_that_matter(replace(given, chosen=(0, 1)), [0, 1]) == [0, 1]
+    rotors = [kind("coulomb_friction"), kind("armature"), kind("armature")]
+    twice = found_with(seen, rotors, noisy(seen, 1.0, 0.1), 0.1)
+    assert len(those_that_matter(replace(twice, chosen=(0, 1, 2)), (0, 1, 2))) == 2

@@ -3,21 +3,9 @@
 import numpy as np
 import pytest
 
-from excite_cli.config.load import load_spec
 from excite_cli.diagnosis.covariate import Covariate
-from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.diagnosis.records import Diagnosis
-from excite_cli.dynamics.base_parameters import find_base_parameters
-from excite_cli.effects.catalogue import kind_named
-from excite_cli.robot.model import build_robot
-from tests.cli.program import SMOKE
-from tests.diagnosis.test_held_out import motion
-
-pytest.importorskip("mujoco")
-
-from excite_cli.simulation.ground_truth import plant
-from excite_cli.simulation.settings import SimulationSettings
-from excite_cli.simulation.simulate import simulate
+from tests.diagnosis.simulated_arm import ELBOW, planted, played, told
 
 VISCOUS, COULOMB, CURVED = 2.0, 1.5, 4.0
 
@@ -25,40 +13,32 @@ VISCOUS, COULOMB, CURVED = 2.0, 1.5, 4.0
 @pytest.fixture(scope="module")
 def found() -> Diagnosis:
     """An arm with friction of three parts on its third joint."""
-    kinds = "[viscous_friction,coulomb_friction,nonlinear_viscous_friction]"
-    spec = load_spec(SMOKE, [f"diagnosis.kinds={kinds}"])
-    robot = build_robot(spec.robot, SMOKE.parent)
-    planted = [
-        plant(kind_named("viscous_friction"), (2,), VISCOUS, {}),
-        plant(kind_named("coulomb_friction"), (2,), COULOMB, {}),
-        plant(kind_named("nonlinear_viscous_friction"), (2,), CURVED, {"power": 0.5}),
+    effects = [
+        planted("viscous_friction", ELBOW, VISCOUS),
+        planted("coulomb_friction", ELBOW, COULOMB),
+        planted("nonlinear_viscous_friction", ELBOW, CURVED, power=0.5),
     ]
-    motions = [motion(robot, number) for number in (1, 2, 3)]
-    settings = SimulationSettings(rate=200.0, lead_in=0.5)
-    data = simulate(robot, motions, settings, planted).dataset
-    return diagnose(robot, find_base_parameters(robot), data, spec)
+    return told(played(effects), "viscous_friction,coulomb_friction,nonlinear_viscous_friction")
 
 
-def test_held_out_traces_are_what_the_errors_say(found: Diagnosis) -> None:
+def test_traces_are_what_the_errors_say(found: Diagnosis) -> None:
     (held_out,) = found.held_out_traces
-    assert (held_out.run, held_out.held_out) == ("motion_3", True)
+    assert (held_out.run, held_out.held_out) == ("r3", True)
     assert held_out.before is not None
     for errors, model in ((found.before, held_out.before), (found.after, held_out.predicted)):
         left = held_out.measured - model
         for j, name in enumerate(found.joint_names):
             assert errors.rms[name] == pytest.approx(np.sqrt(np.nanmean(left[:, j] ** 2)), rel=1e-3)
-
-
-def test_training_traces_show_what_effects_take_away(found: Diagnosis) -> None:
     assert found.traces is not None
-    assert [(t.run, t.held_out) for t in found.traces.runs] == [
-        ("motion_1", False), ("motion_2", False),
-    ]  # fmt: skip
+    assert [(t.run, t.held_out) for t in found.traces.runs] == [("r1", False), ("r2", False)]
     for trace in found.traces.runs:
         assert trace.before is not None
-        at = trace.counted[:, 2]
-        before = np.sum((trace.measured - trace.before)[at, 2] ** 2)
-        assert np.sum((trace.measured - trace.predicted)[at, 2] ** 2) < 0.05 * before
+        at = trace.counted[:, ELBOW]
+        before, after = (
+            np.sum((trace.measured - model)[at, ELBOW] ** 2)
+            for model in (trace.before, trace.predicted)
+        )
+        assert after < 0.05 * before
 
 
 def test_partial_residuals_follow_the_laws_that_are_reported(found: Diagnosis) -> None:
@@ -75,9 +55,7 @@ def test_partial_residuals_follow_the_laws_that_are_reported(found: Diagnosis) -
             assert named.parameters["viscous"].value == pytest.approx(VISCOUS, rel=0.05)
             assert own == pytest.approx(named.parameters["viscous"].value * x, rel=1e-3, abs=1e-3)
             assert (trace.quantity, trace.unit) == ("speed", "rad/s")
-
-
-def test_the_parts_of_friction_add_up(found: Diagnosis) -> None:
+    # The parts of friction add up.
     assert found.traces is not None
     parts = [t for t in found.traces.effects if t.quantity == "speed" and t.rows == t.joints]
     parts = [t for t in parts if t.rows == (found.joint_names[2],)]

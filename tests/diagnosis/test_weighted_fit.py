@@ -36,9 +36,7 @@ def test_sigma_is_what_is_left_for_each_degree_of_freedom() -> None:
         counts += run.usable.sum(axis=0)
     expected = np.sqrt(squares / counts / (1.0 - len(parameters) / counts.sum()))
     assert sigma == pytest.approx(expected, rel=1e-3)
-
-
-def test_of_data_without_noise_sigma_is_the_rounding_of_the_torque() -> None:
+    # Of data without noise sigma is the rounding of the torque.
     data, candidates = random_data(7), random_candidates(7)
     data = _with(data, tuple(own @ np.array([1e3, 2e3, -1e3, 5e2]) for own in data.declared))
     sigma = WeightedFit(data, candidates)([])[1]
@@ -46,16 +44,14 @@ def test_of_data_without_noise_sigma_is_the_rounding_of_the_torque() -> None:
     assert sigma == pytest.approx(EXACT * level, rel=0.2)
 
 
-def test_a_prior_holds_what_it_knows() -> None:
+def test_a_prior_holds_what_it_knows_and_what_is_held_is_left_out() -> None:
     data, candidates = random_data(3, 1e4 * PRIOR), random_candidates(3)
     found = WeightedFit(data, candidates)([0])[0]
     known = PRIOR[:, :FIXED].any(axis=0)
     assert found[:FIXED][known] == pytest.approx(np.zeros(known.sum()), abs=1e-3)
     assert np.abs(found[:FIXED][~known]).min() > 1e-3
-
-
-def test_what_is_held_is_left_out() -> None:
-    """The others are those of a model of the torque that is left, without their columns."""
+    # What is held is left out. The others are those of a model of the torque that is left, without
+    # their columns.
     data, candidates = random_data(4), random_candidates(4)
     held = np.array([0.3, 2.0, -1.0, 0.5])
     found = WeightedFit(data, candidates)([1, 2], held)[0]
@@ -116,17 +112,12 @@ def test_imagined_samples_say_what_the_textbooks_model_says() -> None:
 def test_rows_of_what_is_imagined_give_the_same(chosen: list[int]) -> None:
     data, candidates = random_data(2), random_candidates(2)
     fit = beside_imagined(2, (0, 1))
+    for plain in ((), (0,), (0, 1)):  # nothing is imagined for the textbook's model
+        assert len(fit.imagined(plain)[0]) == 0
+        assert fit(plain)[0] == pytest.approx(WeightedFit(data, candidates)(plain)[0], rel=1e-12)
     rows = data.rows(candidates, chosen)
     found = fit_rows(rows, "wls", fit.imagined(chosen)).x
     assert found == pytest.approx(fit(chosen)[0], rel=1e-8, abs=1e-12)
-
-
-@pytest.mark.parametrize("chosen", [(), (0,), (0, 1)])
-def test_nothing_is_imagined_for_the_textbooks_model(chosen: tuple[int, ...]) -> None:
-    fit = beside_imagined(3, (0, 1))
-    assert len(fit.imagined(chosen)[0]) == 0
-    bare = WeightedFit(random_data(3), random_candidates(3))
-    assert fit(chosen)[0] == pytest.approx(bare(chosen)[0], rel=1e-12)
 
 
 def test_what_the_data_hardly_show_is_the_textbooks() -> None:

@@ -30,11 +30,13 @@ def points() -> dict[str, str]:
     return found
 
 
-def install(folder: Path, text: str, names: dict[str, str], module: str = MODULE) -> None:
+def install(
+    folder: Path, text: str, names: dict[str, str], module: str = MODULE, group: str = GROUP
+) -> None:
     """What an installer leaves of a package with one module."""
     (folder / f"{module}.py").write_text(text, encoding="utf-8")
     info = folder / f"{module}-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {module}\nVersion: 1.0\n")
-    lines = [f"[{GROUP}]", *(f"{name} = {value}" for name, value in names.items())]
+    lines = [f"[{group}]", *(f"{name} = {value}" for name, value in names.items())]
     (info / "entry_points.txt").write_text("\n".join(lines) + "\n")

@@ -1,50 +1,36 @@
 """The quantity over which a person sees an effect."""
 
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
-from excite_cli.dynamics.regressor import standard_parameters
-from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Parameter, Signals
 from excite_cli.effects.catalogue import catalogue, kind_named
-from excite_cli.measurement.run_identity import RunId
-from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.model import Array
+from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
 
-
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return random_robot(4, joints=3, branches=False, prismatic=False)
-
-
-@pytest.fixture(scope="module")
-def signals(robot: Robot) -> Signals:
-    t = np.linspace(0.0, 4.0, 401)
-    phase = np.arange(robot.n)
-    q = np.sin(2.0 * t[:, None] + phase)
-    v, a = 2.0 * np.cos(2.0 * t[:, None] + phase), -4.0 * q
-    body = RigidBody(robot, standard_parameters(robot), q, v, a)
-    column = {"": 20.0 + t}
-    run = RunId("r1")
-    return Signals(t, q, v, a, body.load, 1.5 * body.load, body, run, covariates=column)
+ROBOT = random_robot(4, joints=3, branches=False, prismatic=False)
+MOVED = signals_of(ROBOT, 400)
+SIGNALS = replace(MOVED, torque=1.5 * MOVED.load)
 
 
 @pytest.mark.parametrize("kind", sorted(catalogue()))
-def test_every_kind_can_be_drawn(kind: str, robot: Robot, signals: Signals) -> None:
+def test_every_kind_can_be_drawn(kind: str) -> None:
     effect_kind = kind_named(kind)
     shape, _ = effect_kind.planted(1.0, {})
     whole = effect_kind.scope == "base"
-    place = tuple(range(robot.n)) if whole else effect_kind.places(robot)[0]
-    found = effect_kind(place, shape).abscissa(signals)
+    place = tuple(range(ROBOT.n)) if whole else effect_kind.places(ROBOT)[0]
+    found = effect_kind(place, shape).abscissa(SIGNALS)
     if found is None:  # drawn over the torque that it predicts
         assert kind in {
             "backlash", "base_tilt", "cable_force", "elasticity", "encoder_offset", "payload",
             "torque_delay", "wrench_gain",
         }  # fmt: skip
         return
-    assert found.values.shape == signals.t.shape
+    assert found.values.shape == SIGNALS.t.shape
     assert np.isfinite(found.values).all()
     assert found.name
     assert found.unit
@@ -55,28 +41,28 @@ def test_every_kind_can_be_drawn(kind: str, robot: Robot, signals: Signals) -> N
     [("coulomb_friction", "v", "rad/s"), ("spring", "q", "rad"), ("armature", "a", "rad/s²"),
      ("torque_gain", "load", "N·m")],
 )  # fmt: skip
-def test_one_quantity_of_its_joint(kind: str, series: str, unit: str, signals: Signals) -> None:
-    found = kind_named(kind)((1,)).abscissa(signals)
+def test_one_quantity_of_its_joint(kind: str, series: str, unit: str) -> None:
+    found = kind_named(kind)((1,)).abscissa(SIGNALS)
     assert found is not None
-    assert np.array_equal(found.values, getattr(signals, series)[:, 1])
+    assert np.array_equal(found.values, getattr(SIGNALS, series)[:, 1])
     assert found.unit == unit
 
 
-def test_ripple_repeats_within_its_period(signals: Signals) -> None:
+def test_ripple_repeats_within_its_period() -> None:
     effect = kind_named("ripple")((0,), {"periods": 12.0})
-    found = effect.abscissa(signals)
+    found = effect.abscissa(SIGNALS)
     assert found is not None
     assert found.period == pytest.approx(2 * np.pi / 12.0)
     angle = np.mod(found.values, found.period) * 12.0
-    columns = effect.columns(signals)[:, 0]
+    columns = effect.columns(SIGNALS)[:, 0]
     assert columns == pytest.approx(np.stack([np.cos(angle), np.sin(angle)], axis=1), abs=1e-9)
-
-
-def test_friction_with_load_is_a_line_over_its_abscissa(signals: Signals) -> None:
+    # Friction with load is a line over its abscissa.
     effect = kind_named("load_dependent_friction")((2,))
-    found = effect.abscissa(signals)
+    found = effect.abscissa(SIGNALS)
     assert found is not None
-    assert np.array_equal(found.values, effect.columns(signals)[:, 0, 0])
+    assert np.array_equal(found.values, effect.columns(SIGNALS)[:, 0, 0])
+    # Effects of users need none.
+    assert Own((0,)).abscissa(SIGNALS) is None
 
 
 class Own(Effect):
@@ -89,7 +75,3 @@ class Own(Effect):
 
     def columns(self, signals: Signals) -> Array:
         return np.ones((len(signals.t), 1, 1))
-
-
-def test_effects_of_users_need_none(signals: Signals) -> None:
-    assert Own((0,)).abscissa(signals) is None

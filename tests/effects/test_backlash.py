@@ -28,10 +28,8 @@ def test_flight_lasts_as_the_gap_asks() -> None:
         ((first, last, closed),) = Flights(side * rate * t, step).across(np.array([gap]))[0]
         assert closed
         assert (last - first) * step == pytest.approx((6 * gap / rate) ** (1 / 3), abs=3e-4)
-
-
-def test_flight_ends_where_the_link_comes_back() -> None:
-    """With δ'' = cos t − 0.2, δ = 1 − cos t − 0.1 t² is back at zero before a turn is over."""
+    # Flight ends where the link comes back. With δ'' = cos t − 0.2, δ = 1 − cos t − 0.1 t² is back
+    # at zero before a turn is over.
     step = 1e-3
     t = step * np.arange(9000)
     acceleration = np.concatenate([[-1e-9], np.cos(t) - 0.2])
@@ -39,9 +37,7 @@ def test_flight_ends_where_the_link_comes_back() -> None:
     assert (first, closed) == (1, True)
     back = brentq(lambda x: 1 - np.cos(x) - 0.1 * x**2, 3.0, 6.0)
     assert (last - first) * step == pytest.approx(back, abs=0.01)
-
-
-def test_flight_that_outlasts_the_run_has_no_blow() -> None:
+    # Flight that outlasts the run has no blow.
     gaps = np.array([1.0, 1e-7])
     wide, narrow = Flights(np.array([-1.0, 1.0, 1.0, 1.0]), 1e-3).across(gaps)
     assert wide == [(1, 4, False)]
@@ -116,16 +112,12 @@ def test_flights_and_blows_are_those_of_two_bodies_with_play() -> None:
     assert left < 0.25
 
 
-def test_gap_is_found() -> None:
+def test_gap_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the middles of long recordings."""
     signals, residual = _with_play(GAP)
     both = np.stack([np.zeros_like(residual), residual], axis=-1)
     (shape,) = Backlash.tuned(_robot(), (1,), [signals], [both])
     assert shape["gap"] == pytest.approx(GAP, rel=0.1)
-
-
-def test_gap_is_found_in_the_middles_of_long_recordings(monkeypatch: pytest.MonkeyPatch) -> None:
-    signals, residual = _with_play(GAP)
-    both = np.stack([np.zeros_like(residual), residual], axis=-1)
     early = np.arange(len(both)) < len(both) // 4
     both[early] = both[~early][: early.sum()]  # what has nothing to do with the motion there
     monkeypatch.setattr(backlash, "_SEARCHED", len(both))

@@ -8,66 +8,27 @@ from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue, declared_effects, kind_named
 from excite_cli.errors import ConfigError
 from excite_cli.measurement.run_identity import RunId
-from excite_cli.robot.model import Robot
 from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
 
-KINDS = [
-    "viscous_friction",
-    "nonlinear_viscous_friction",
-    "coulomb_friction",
-    "asymmetric_friction",
-    "stribeck_friction",
-    "load_dependent_friction",
-    "position_friction",
-    "dahl_friction",
-    "friction_drift",
-    "friction_change",
-    "covariate_friction",
-    "coupled_friction",
-    "armature",
-    "spring",
-    "torque_offset",
-    "covariate_offset",
-    "torque_gain",
-    "torque_delay",
-    "wrench_gain",
-    "torque_saturation",
-    "ripple",
-    "cable_force",
-    "elasticity",
-    "backlash",
-    "base_tilt",
-    "payload",
-    "encoder_offset",
-    "contact",
-]
+ROBOT = random_robot(9, joints=3, branches=False)
+KINDS = list(catalogue())
 
 
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return random_robot(9, joints=3, branches=False)
-
-
-def _every_effect(kind: type[Effect], robot: Robot, samples: int) -> list[Effect]:
-    signals = [signals_of(robot, samples)]
+def _every_effect(kind: type[Effect], samples: int) -> list[Effect]:
+    signals = [signals_of(ROBOT, samples)]
     return [
         kind(place, shape)
-        for place in (kind.places(robot) or [tuple(range(robot.n))])
-        for shape in [kind.planted(1.0, {})[0], *kind.grid(robot, place, signals)[:6]]
+        for place in (kind.places(ROBOT) or [tuple(range(ROBOT.n))])
+        for shape in [kind.planted(1.0, {})[0], *kind.grid(ROBOT, place, signals)[:6]]
     ]
-
-
-def test_catalogue_has_the_kinds_that_files_and_reports_name() -> None:
-    assert list(catalogue()) == KINDS
-    assert all(name == kind.kind for name, kind in catalogue().items())
 
 
 @pytest.mark.parametrize("name", KINDS)
 @pytest.mark.parametrize("samples", [1, 2, 40])
-def test_columns_fit_rows_and_parameters(name: str, samples: int, robot: Robot) -> None:
-    kind, signals = catalogue()[name], signals_of(robot, samples)
-    for effect in _every_effect(kind, robot, samples):
+def test_columns_fit_rows_and_parameters(name: str, samples: int) -> None:
+    kind, signals = catalogue()[name], signals_of(ROBOT, samples)
+    for effect in _every_effect(kind, samples):
         columns = effect.columns(signals)
         assert columns.shape == (samples, len(effect.rows(3)), len(kind.parameters))
         assert np.isfinite(columns).all()
@@ -84,6 +45,7 @@ def test_parameters_have_units_ranges_and_unique_names(name: str) -> None:
     everything = (*kind.parameters, *kind.shapes)
     assert len({p.name for p in everything}) == len(everything)
     assert all(p.unit and p.low < p.high for p in everything)
+    assert kind.kind == name
     assert kind.title
     assert kind.signature
     count = len(kind.parameters)
@@ -96,10 +58,10 @@ def test_parameters_have_units_ranges_and_unique_names(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_standing_still_leaves_no_nan(name: str, robot: Robot) -> None:
-    signals = signals_of(robot, 5)
+def test_standing_still_leaves_no_nan(name: str) -> None:
+    signals = signals_of(ROBOT, 5)
     still = type(signals)(**{**vars(signals), "v": signals.v * 0, "load": signals.load * 0})
-    for effect in _every_effect(catalogue()[name], robot, 5):
+    for effect in _every_effect(catalogue()[name], 5):
         columns = effect.columns(still)
         assert np.isfinite(columns).all()
         if effect.excitable:
@@ -108,28 +70,26 @@ def test_standing_still_leaves_no_nan(name: str, robot: Robot) -> None:
             assert all(np.isfinite(part).all() for part in parts if part is not None)
 
 
-def test_an_effect_is_silent_in_the_runs_it_does_not_name(robot: Robot) -> None:
+def test_an_effect_is_silent_in_the_runs_it_does_not_name() -> None:
     kind = kind_named("torque_offset")
     effect = kind((1,), {}, ("second",))
     first, second = (
         type(s)(**{**vars(s), "run": run})
         for run in (RunId("first"), RunId("second", 2))
-        for s in [signals_of(robot, 4)]
+        for s in [signals_of(ROBOT, 4)]
     )
     assert not effect.torque(first, np.array([2.0])).any()
     assert effect.torque(second, np.array([2.0]))[:, 1] == pytest.approx(2.0)
 
 
-def test_declared_delay_on_all_joints_is_one_delay(robot: Robot) -> None:
+def test_declared_effects_are_placed_and_checked() -> None:
     specs = (EffectSpec(kind="torque_delay"), EffectSpec(kind="coupled_friction"))
-    found = declared_effects(specs, robot)
+    found = declared_effects(specs, ROBOT)
     assert [effect.joints for effect in found] == [(0, 1, 2), (0, 1), (1, 2)]
     assert found[1].shape == {"direction": 1.0}
-
-
-def test_shape_of_a_declared_effect_is_checked(robot: Robot) -> None:
+    # Shape of a declared effect is checked.
     spec = EffectSpec(kind="stribeck_friction", shape={"stribeck_sped": 0.1})
     with pytest.raises(ConfigError, match="Did you mean 'stribeck_speed'"):
-        declared_effects((spec,), robot)
+        declared_effects((spec,), ROBOT)
     with pytest.raises(ConfigError, match="Did you mean 'coulomb_friction'"):
         kind_named("coulom_friction")

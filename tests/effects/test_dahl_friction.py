@@ -7,27 +7,23 @@ from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.effects.dahl_friction import DahlFriction, _Bristle
 from excite_cli.excitation.gradient_check import fourth_order_differences, relative_error
-from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.model import Array
 from tests.effects.motions import signals_at
 from tests.robot.random_robots import random_robot
 
 D = 0.05
+ROBOT = random_robot(4, joints=1, branches=False, prismatic=False)
 
 
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return random_robot(4, joints=1, branches=False, prismatic=False)
+def along(t: Array, q: Array, v: Array) -> Signals:
+    return signals_at(ROBOT, t, q[:, None], v[:, None], np.zeros((len(t), 1)))
 
 
-def along(robot: Robot, t: Array, q: Array, v: Array) -> Signals:
-    return signals_at(robot, t, q[:, None], v[:, None], np.zeros((len(t), 1)))
-
-
-def swinging(robot: Robot, step: float, seconds: float = 6.0) -> Signals:
+def swinging(step: float, seconds: float = 6.0) -> Signals:
     """Two sines, with reversals at different angles; the joint moves from the beginning."""
     t = step * np.arange(round(seconds / step))
     q = 0.4 * np.sin(1.9 * t) + 0.1 * np.sin(5.3 * t)
-    return along(robot, t, q, 0.76 * np.cos(1.9 * t) + 0.53 * np.cos(5.3 * t))
+    return along(t, q, 0.76 * np.cos(1.9 * t) + 0.53 * np.cos(5.3 * t))
 
 
 def state(signals: Signals, distance: float = D) -> Array:
@@ -47,67 +43,55 @@ def by_steps(q: Array, first: float) -> Array:
 
 @pytest.mark.parametrize(("every", "error"), [(1, 1.5e-3), (200, 2e-3), (400, 1.5e-2)])
 def test_it_follows_the_differential_equation_however_coarse_the_samples(
-    robot: Robot, every: int, error: float
+    every: int, error: float
 ) -> None:
     """At 0.1, 20 and 40 ms; turning points lie between the samples."""
-    fine = swinging(robot, 1e-4)
+    fine = swinging(1e-4)
     expected = by_steps(fine.q[:, 0], 1.0)
-    found = state(swinging(robot, 1e-4 * every))
+    found = state(swinging(1e-4 * every))
     assert np.abs(found - expected[::every][: len(found)]).max() < error
 
 
-def test_after_a_reversal_it_builds_up_over_the_distance(robot: Robot) -> None:
+def test_after_a_reversal_it_builds_up_over_the_distance() -> None:
     t = 0.01 * np.arange(301)
     q = np.where(t < 1.5, t, 3.0 - t)
-    z = state(along(robot, t, q, np.where(t < 1.5, 1.0, -1.0)))
+    z = state(along(t, q, np.where(t < 1.5, 1.0, -1.0)))
     assert z[t < 1.5] == pytest.approx(1.0, abs=1e-9)
     way = 1.5 - q[t > 1.55]
     assert z[t > 1.55] == pytest.approx(2.0 * np.exp(-way / D) - 1.0, abs=1e-6)
-
-
-def test_a_record_that_begins_at_rest_begins_relaxed(robot: Robot) -> None:
+    # A record that begins at rest begins relaxed.
     t = 0.01 * np.arange(201)
     q = 0.5 * t**2
-    z = state(along(robot, t, q, t))
+    z = state(along(t, q, t))
     assert z == pytest.approx(1.0 - np.exp(-q / D), abs=2e-3)
-
-
-def test_over_a_short_distance_it_is_nothing_beside_coulomb_friction(robot: Robot) -> None:
-    signals = swinging(robot, 0.01)
-    moves = np.abs(signals.v[:, 0]) > 0.2
-    short, long = (DahlFriction((0,), {"distance": d}).columns(signals) for d in (5e-4, D))
-    assert short[moves] == pytest.approx(0.0, abs=1e-2)
-    assert np.abs(long[moves]).max() > 1.0
-
-
-def test_noise_around_a_standstill_hardly_wears_the_memory_off(robot: Robot) -> None:
-    """Ten seconds with a speed of 1 mrad/s (RMS): the friction of the last move is still there."""
+    # Noise around a standstill hardly wears the memory off. Ten seconds with a speed of 1 mrad/s
+    # (RMS): the friction of the last move is still there.
     t = 0.01 * np.arange(1201)
     noise = 1.5e-5 * np.sin(2 * np.pi * 15.0 * t) * (t > 1.0)
     q = 0.3 * np.minimum(t, 1.0) + noise
-    z = state(along(robot, t, q, np.gradient(q, t)), 0.01)
+    z = state(along(t, q, np.gradient(q, t)), 0.01)
     assert z[t > 1.05].min() > 0.9
 
 
-def test_distances_follow_the_travelled_range(robot: Robot) -> None:
-    signals = swinging(robot, 0.02)
+def test_distances_follow_the_travelled_range() -> None:
+    signals = swinging(0.02)
     travelled = np.ptp(signals.q)
-    grid = [shape["distance"] for shape in DahlFriction.grid(robot, (0,), [signals])]
+    grid = [shape["distance"] for shape in DahlFriction.grid(ROBOT, (0,), [signals])]
     assert grid == pytest.approx(
         np.clip(travelled * np.geomspace(1e-3, 0.25, 7), 5e-4, 0.5), rel=1e-6
     )
     still = Signals(**{**vars(signals), "q": 0.0 * signals.q})
-    assert [s["distance"] for s in DahlFriction.grid(robot, (0,), [still])] == [5e-4]
+    assert [s["distance"] for s in DahlFriction.grid(ROBOT, (0,), [still])] == [5e-4]
 
 
-def test_pull_back_goes_through_turning_points(robot: Robot) -> None:
+def test_pull_back_goes_through_turning_points() -> None:
     """With the narrow sign of measured data, on steps that are long against it."""
-    signals = swinging(robot, 0.1)
+    signals = swinging(0.1)
     effect = DahlFriction((0,), {"distance": D})
     weights = np.random.default_rng(2).normal(size=(len(signals.t), 1, 1))
 
     def value(x: Array) -> float:
-        return float((weights * effect.columns(signals_at(robot, signals.t, *x))).sum())
+        return float((weights * effect.columns(signals_at(ROBOT, signals.t, *x))).sum())
 
     back = effect.pull_back(signals, weights)
     assert back.q is not None
@@ -118,8 +102,8 @@ def test_pull_back_goes_through_turning_points(robot: Robot) -> None:
     assert relative_error(np.stack([back.q, back.v, 0 * back.q]), reference) < 1e-6
 
 
-def test_the_simulated_bristle_is_the_column(robot: Robot) -> None:
-    signals = swinging(robot, 1e-3)
+def test_the_simulated_bristle_is_the_column() -> None:
+    signals = swinging(1e-3)
     bristle = _Bristle(3.0, D)
     bristle.begin(signals.q[0, 0], signals.v[0, 0])
     torque = [bristle.torque(q, v) for q, v in zip(signals.q[:, 0], signals.v[:, 0], strict=True)]
@@ -133,10 +117,10 @@ def test_what_was_before_a_record_counts_until_it_is_forgotten() -> None:
     assert (stiffness.value, stiffness.std) == pytest.approx((60.0, 4.0))
 
 
-def test_it_is_drawn_over_the_way_since_the_last_reversal(robot: Robot) -> None:
+def test_it_is_drawn_over_the_way_since_the_last_reversal() -> None:
     t = 0.01 * np.arange(301)
     q = np.where(t < 1.5, 0.2 * t, 0.6 - 0.2 * t)
-    drawn = DahlFriction((0,), {"distance": D}).abscissa(along(robot, t, q, np.gradient(q, t)))
+    drawn = DahlFriction((0,), {"distance": D}).abscissa(along(t, q, np.gradient(q, t)))
     assert drawn is not None
     assert drawn.unit == "rad"
     back = t > 1.5

@@ -8,16 +8,11 @@ import pytest
 from excite_cli.effects.friction_change import FrictionChange
 from excite_cli.effects.signals import Signals
 from excite_cli.measurement.run_identity import RunId
-from excite_cli.robot.model import Robot
 from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
 
 CHANGE = np.array([-0.9, 0.4])
-
-
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return random_robot(9, joints=3, branches=False)
+ROBOT = random_robot(9, joints=3, branches=False)
 
 
 def at(signals: Signals, start: float, name: str = "run") -> Signals:
@@ -25,8 +20,8 @@ def at(signals: Signals, start: float, name: str = "run") -> Signals:
 
 
 @pytest.mark.parametrize("constant", [1.0, 30.0, 1e4])
-def test_nothing_at_the_start_and_all_of_it_at_the_end(robot: Robot, constant: float) -> None:
-    signals = signals_of(robot, 200)
+def test_nothing_at_the_start_and_all_of_it_at_the_end(constant: float) -> None:
+    signals = signals_of(ROBOT, 200)
     effect = FrictionChange((1,), {"time_constant": constant, "span": 100.0})
     v = signals.v[:, 1]
     first = effect.torque(at(signals, 0.0), CHANGE)[:, 1]
@@ -43,28 +38,20 @@ def test_a_long_time_constant_is_a_straight_line_a_short_one_is_soon_over() -> N
     assert quick.progress(25.0) > 0.99
 
 
-def test_it_is_looked_for_over_the_span_of_three_recordings_or_more(robot: Robot) -> None:
-    signals = signals_of(robot, 50)
+def test_it_is_looked_for_over_the_span_of_three_recordings_or_more() -> None:
+    signals = signals_of(ROBOT, 50)
     runs = [at(signals, 60.0 * k, f"r{k}") for k in range(3)]
     span = 120.0
-    grid = FrictionChange.grid(robot, (0,), runs)
+    grid = FrictionChange.grid(ROBOT, (0,), runs)
     assert [shape["span"] for shape in grid] == pytest.approx([span] * len(grid))
-    assert FrictionChange.grid(robot, (0,), runs[:2]) == []
-    assert FrictionChange.grid(robot, (0,), [runs[0]] * 3) == []
-
-
-def test_the_span_is_kept_when_shapes_are_refined(robot: Robot) -> None:
+    assert FrictionChange.grid(ROBOT, (0,), runs[:2]) == []
+    assert FrictionChange.grid(ROBOT, (0,), [runs[0]] * 3) == []
     effect = FrictionChange((0,), {"time_constant": 10.0, "span": 100.0})
     assert not effect.finer_steps("span", [])
     assert effect.finer_steps("time_constant", [])
-
-
-def test_what_is_over_before_the_second_recording_is_a_step_and_not_looked_for(
-    robot: Robot,
-) -> None:
-    signals = signals_of(robot, 50)
+    # What is over before the second recording is a step and not looked for.
     runs = [at(signals, start, f"r{start}") for start in (0.0, 60.0, 120.0)]
-    grid = FrictionChange.grid(robot, (0,), runs)
+    grid = FrictionChange.grid(ROBOT, (0,), runs)
     assert grid
     for shape in grid:
         found = FrictionChange((0,), shape)

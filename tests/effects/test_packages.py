@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 import excite_cli as api
-from excite_cli.effects.catalogue import GROUP, catalogue, kind_named
+from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.errors import ConfigError, ExciteWarning
+from tests.effects import own_package
 from tests.trust.conftest import SMOKE
 from tests.trust.in_process import excite
 
@@ -59,17 +60,6 @@ def _catalogue_read_anew(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     catalogue.cache_clear()
 
 
-def install(folder: Path, code: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A package with one module, that declares the effect `mine`."""
-    (folder / "foreign_effects.py").write_text(code, encoding="utf-8")
-    info = folder / "foreign_effects-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: foreign_effects\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(f"[{GROUP}]\nmine = foreign_effects:{name}\n")
-    monkeypatch.syspath_prepend(folder)
-    monkeypatch.delitem(sys.modules, "foreign_effects", raising=False)
-
-
 @pytest.mark.parametrize("case", UNUSABLE)
 def test_an_effect_that_cannot_be_used_is_set_aside(
     case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -116,6 +106,9 @@ def test_columns_that_fail_are_set_aside_by_the_diagnosis(
     assert {effect.kind for effect, _ in found} == {"spring"}
 
 
-def test_a_sound_effect_is_looked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    install(tmp_path, GOOD, "Mine", monkeypatch)
-    assert len(catalogue()) == OURS + 1
+def install(folder: Path, code: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A package with one module, that declares the effect `mine`."""
+    module = "foreign_effects"
+    own_package.install(folder, code, {"mine": f"{module}:{name}"}, module)
+    monkeypatch.syspath_prepend(folder)
+    monkeypatch.delitem(sys.modules, module, raising=False)

@@ -19,11 +19,7 @@ from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
 
 _, SPHERE = Payload.planted(2.0, {"cx": 0.03, "cy": -0.02, "cz": 0.1})
-
-
-@pytest.fixture(scope="module")
-def branched() -> Robot:
-    return next(r for r in map(random_robot, range(40)) if len(leaves(r)) > 1)
+BRANCHED = next(r for r in map(random_robot, range(40)) if len(leaves(r)) > 1)
 
 
 def carried(robot: Robot, joint: int) -> str:
@@ -37,40 +33,32 @@ def carried(robot: Robot, joint: int) -> str:
 
 
 @pytest.mark.parametrize("leaf", [0, -1])
-def test_its_columns_are_those_of_the_body_that_carries_it(branched: Robot, leaf: int) -> None:
-    joint = leaves(branched)[leaf]
-    signals = signals_of(branched)
-    phi = standard_parameters(branched)
-    at = 10 * (branched.n_bodies - branched.n + joint)
+def test_its_columns_are_those_of_the_body_that_carries_it(leaf: int) -> None:
+    joint = leaves(BRANCHED)[leaf]
+    signals = signals_of(BRANCHED)
+    phi = standard_parameters(BRANCHED)
+    at = 10 * (BRANCHED.n_bodies - BRANCHED.n + joint)
     phi[at : at + 10] += SPHERE
-    heavier = RigidBody(branched, phi, signals.q, signals.v, signals.a).load
+    heavier = RigidBody(BRANCHED, phi, signals.q, signals.v, signals.a).load
     added = Payload((joint,)).torque(signals, SPHERE)
     assert np.abs(added).max() > 1e-3
     assert heavier - signals.load == pytest.approx(added, abs=1e-9)
 
 
-def test_every_leaf_is_looked_at_and_any_link_may_be_named(branched: Robot) -> None:
-    places = [(j,) for j in leaves(branched)]
-    assert Payload.places(branched) == places
-    assert places_named(Payload, ("all",), branched, "x") == places
-    link = carried(branched, leaves(branched)[0])
-    (planted,) = parse_planted(f"payload@{link}=1.5", branched, {})
-    assert planted.effect.joints == (leaves(branched)[0],)
-    (declared,) = declared_effects((EffectSpec(kind="payload", joints=(link,)),), branched)
-    assert declared.joints == (leaves(branched)[0],)
-
-
-def test_a_name_of_nothing_is_refused_with_links_to_choose_from(branched: Robot) -> None:
+def test_every_leaf_is_looked_at_and_any_link_may_be_named() -> None:
+    places = [(j,) for j in leaves(BRANCHED)]
+    assert Payload.places(BRANCHED) == places
+    assert places_named(Payload, ("all",), BRANCHED, "x") == places
+    link = carried(BRANCHED, leaves(BRANCHED)[0])
+    (planted,) = parse_planted(f"payload@{link}=1.5", BRANCHED, {})
+    assert planted.effect.joints == (leaves(BRANCHED)[0],)
+    (declared,) = declared_effects((EffectSpec(kind="payload", joints=(link,)),), BRANCHED)
+    assert declared.joints == (leaves(BRANCHED)[0],)
+    # A name of nothing is refused with links to choose from.
     with pytest.raises(ConfigError, match="or the name of a link"):
-        places_named(Payload, ("no_such",), branched, "here")
+        places_named(Payload, ("no_such",), BRANCHED, "here")
     with pytest.raises(ConfigError, match="no moved joint carries link"):
-        link_frame(branched, "link_0", "here")
-
-
-def test_files_of_earlier_versions_name_all_joints_and_mean_the_last(branched: Robot) -> None:
-    signals = signals_of(branched)
-    every = Payload(tuple(range(branched.n))).columns(signals)
-    assert np.array_equal(every, Payload((branched.n - 1,)).columns(signals))
+        link_frame(BRANCHED, "link_0", "here")
 
 
 def test_numbers_are_told_in_the_frame_of_the_named_link() -> None:
@@ -80,15 +68,17 @@ def test_numbers_are_told_in_the_frame_of_the_named_link() -> None:
     centre = turn.T @ (np.array([0.03, -0.02, 0.1]) - link.translation)
     expected = Payload.planted(2.0, dict(zip(("cx", "cy", "cz"), centre, strict=True)))[1]
     assert seen == pytest.approx(expected, abs=1e-12)
-
-
-def test_the_first_named_link_on_the_joint_tells(branched: Robot) -> None:
-    joint = leaves(branched)[-1]
-    link = carried(branched, joint)
-    told = told_on(Payload((joint,)), branched, (carried(branched, leaves(branched)[0]), link))
+    # The first named link on the joint tells.
+    joint = leaves(BRANCHED)[-1]
+    link = carried(BRANCHED, joint)
+    told = told_on(Payload((joint,)), BRANCHED, (carried(BRANCHED, leaves(BRANCHED)[0]), link))
     assert told is not None
     assert told.name == link
-    assert told_on(CoulombFriction((joint,)), branched, (link,)) is None
+    assert told_on(CoulombFriction((joint,)), BRANCHED, (link,)) is None
+    # Files of earlier versions name all joints and mean the last.
+    signals = signals_of(BRANCHED)
+    every = Payload(tuple(range(BRANCHED.n))).columns(signals)
+    assert np.array_equal(every, Payload((BRANCHED.n - 1,)).columns(signals))
 
 
 def test_moving_there_and_back_changes_nothing() -> None:

@@ -18,14 +18,10 @@ from tests.robot.random_robots import random_robot
 WITH_SLOPE = {"covariate_friction", "covariate_offset", "friction_change", "wrench_gain"}
 EXCITABLE = [name for name, kind in catalogue().items() if kind.excitable]
 SAMPLES, STEP = 5, 0.1
-
-
-@pytest.fixture(scope="module")
-def robots() -> list[Robot]:
-    return [
-        random_robot(3, joints=3, branches=False, prismatic=False),
-        random_robot(8, joints=3, floating=True, rows=("joints",)),
-    ]
+ROBOTS = [
+    random_robot(3, joints=3, branches=False, prismatic=False),
+    random_robot(8, joints=3, floating=True, rows=("joints",)),
+]
 
 
 def _effects(kind: type[Effect], robot: Robot, signals: Signals) -> list[Effect]:
@@ -54,8 +50,8 @@ def _chained(robot: Robot, signals: Signals, found: Cotangents) -> Array:
 
 
 @pytest.mark.parametrize("name", EXCITABLE)
-def test_pull_back_is_the_derivative_of_the_columns(name: str, robots: list[Robot]) -> None:
-    for seed, robot in enumerate(robots):
+def test_pull_back_is_the_derivative_of_the_columns(name: str) -> None:
+    for seed, robot in enumerate(ROBOTS):
         signals = signals_at(robot, *states(robot, SAMPLES, STEP, seed))
         for effect in _effects(catalogue()[name], robot, signals):
             with sign_of_width(0.5):
@@ -78,19 +74,19 @@ def _both(robot: Robot, signals: Signals, effect: Effect) -> tuple[Array, Array]
 
 
 @pytest.mark.parametrize("name", sorted(set(catalogue()) - set(EXCITABLE) - WITH_SLOPE))
-def test_what_cannot_be_excited_says_why(name: str, robots: list[Robot]) -> None:
+def test_what_cannot_be_excited_says_why(name: str) -> None:
     kind = catalogue()[name]
     assert kind.why_not_excitable
-    signals = signals_at(robots[0], *states(robots[0], SAMPLES, STEP))
-    effect = kind(kind.places(robots[0])[0], kind.planted(1.0, {})[0])
+    signals = signals_at(ROBOTS[0], *states(ROBOTS[0], SAMPLES, STEP))
+    effect = kind(kind.places(ROBOTS[0])[0], kind.planted(1.0, {})[0])
     with pytest.raises(NotImplementedError, match=f"{name} cannot be excited: "):
         effect.pull_back(signals, effect.columns(signals))
 
 
-def test_rate_back_is_the_transpose_of_rate(robots: list[Robot]) -> None:
+def test_rate_back_is_the_transpose_of_rate() -> None:
     rng = np.random.default_rng(0)
     for samples in (1, 2, 3, 4, 9):
-        signals = signals_at(robots[0], *states(robots[0], samples, STEP))
+        signals = signals_at(ROBOTS[0], *states(ROBOTS[0], samples, STEP))
         x, w = rng.normal(size=(2, samples, 3))
         forward = float((w * signals.rate(x)).sum())
         assert forward == pytest.approx(float((signals.rate_back(w) * x).sum()), abs=1e-10)

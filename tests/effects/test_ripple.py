@@ -5,23 +5,15 @@ import pytest
 
 from excite_cli.effects.base import Signals
 from excite_cli.effects.ripple import Ripple, periodogram
-from excite_cli.robot.model import Robot
 from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
 
-
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return random_robot(5, joints=3, branches=False, prismatic=False)
+ROBOT = random_robot(5, joints=3, branches=False, prismatic=False)
+RUNS = [signals_of(ROBOT, 4000, step=0.004, seed=seed) for seed in (0, 1)]
 
 
-@pytest.fixture(scope="module")
-def runs(robot: Robot) -> list[Signals]:
-    return [signals_of(robot, 4000, step=0.004, seed=seed) for seed in (0, 1)]
-
-
-def test_energy_is_that_of_least_squares(runs: list[Signals]) -> None:
-    q = runs[0].q[:, 1]
+def test_energy_is_that_of_least_squares() -> None:
+    q = RUNS[0].q[:, 1]
     residual = np.random.default_rng(0).normal(size=len(q)) + np.sin(11 * q + 0.4)
     periods, energy = periodogram(q, residual, 5.0, 17.0, 0.3)
     assert len(periods) == 41
@@ -33,28 +25,24 @@ def test_energy_is_that_of_least_squares(runs: list[Signals]) -> None:
 
 
 @pytest.mark.parametrize("planted", [20.0, 36.3, 160.0])
-def test_ripple_is_found_below_noise_and_beside_slow_errors(
-    planted: float, robot: Robot, runs: list[Signals]
-) -> None:
+def test_ripple_is_found_below_noise_and_beside_slow_errors(planted: float) -> None:
     effect = Ripple((2,), {"periods": planted})
     residuals = []
-    for seed, signals in enumerate(runs):
+    for seed, signals in enumerate(RUNS):
         noise = np.random.default_rng(seed).normal(size=signals.q.shape)
         slow = 2.0 * np.sin(1.3 * signals.q) + 0.5 * signals.v
         residuals.append(effect.torque(signals, np.array([0.3, -0.4])) + noise + slow)
-    found = [shape["periods"] for shape in Ripple.tuned(robot, (2,), runs, residuals)]
+    found = [shape["periods"] for shape in Ripple.tuned(ROBOT, (2,), RUNS, residuals)]
     assert len(found) <= 4
     # What the data tell apart is a cycle over the travelled range.
-    travelled = np.ptp(np.concatenate([signals.q[:, 2] for signals in runs]))
+    travelled = np.ptp(np.concatenate([signals.q[:, 2] for signals in RUNS]))
     assert min(abs(n - planted) for n in found) < 0.1 * 2 * np.pi / travelled
 
 
 @pytest.mark.parametrize("cycles", [1.1, 1.5, 2.4])
-def test_a_slow_ripple_is_found_beside_gravity_and_friction(
-    cycles: float, robot: Robot, runs: list[Signals]
-) -> None:
+def test_a_slow_ripple_is_found_beside_gravity_and_friction(cycles: float) -> None:
     """A cubic in the angle, which leaves fast ones alone, would take it away."""
-    travelled = np.ptp(np.concatenate([signals.q[:, 2] for signals in runs]))
+    travelled = np.ptp(np.concatenate([signals.q[:, 2] for signals in RUNS]))
     periods = 2 * np.pi * cycles / travelled
     effect = Ripple((2,), {"periods": periods})
     residuals = [
@@ -62,26 +50,24 @@ def test_a_slow_ripple_is_found_beside_gravity_and_friction(
         + 0.5 * np.cos(signals.q)
         + 0.4 * np.sign(signals.v)
         + 0.1 * np.random.default_rng(seed).normal(size=signals.q.shape)
-        for seed, signals in enumerate(runs)
+        for seed, signals in enumerate(RUNS)
     ]
-    found = [shape["periods"] for shape in Ripple.tuned(robot, (2,), runs, residuals)]
+    found = [shape["periods"] for shape in Ripple.tuned(ROBOT, (2,), RUNS, residuals)]
     assert min(abs(n - periods) for n in found) < 0.1 * 2 * np.pi / travelled
 
 
-def test_search_is_bounded_by_range_and_sampling(robot: Robot, runs: list[Signals]) -> None:
-    j, signals = 1, runs[0]
-    periods = [shape["periods"] for shape in Ripple.grid(robot, (j,), [signals])]
+def test_search_is_bounded_by_range_and_sampling() -> None:
+    j, signals = 1, RUNS[0]
+    periods = [shape["periods"] for shape in Ripple.grid(ROBOT, (j,), [signals])]
     assert min(periods) * np.ptp(signals.q[:, j]) == pytest.approx(2 * np.pi)
     speed = np.abs(signals.v[:, j])
     per_sample = max(periods) * np.median(speed[speed > 0.1 * speed.max()]) * 0.004 / (2 * np.pi)
     assert 0.2 < per_sample <= 0.25
-    assert Ripple.tests_of_grid(robot, (j,), [signals]) == len(periods)
+    assert Ripple.tests_of_grid(ROBOT, (j,), [signals]) == len(periods)
     still = Signals(**{**vars(signals), "q": signals.q * 0, "v": signals.v * 0})
-    assert Ripple.tuned(robot, (j,), [still], [signals.q]) == []
-
-
-def test_amplitude_and_phase_are_those_of_one_cosine(runs: list[Signals]) -> None:
-    effect, signals = Ripple((0,), {"periods": 12.0}), runs[0]
+    assert Ripple.tuned(ROBOT, (j,), [still], [signals.q]) == []
+    # Amplitude and phase are those of one cosine.
+    effect, signals = Ripple((0,), {"periods": 12.0}), RUNS[0]
     values, covariance = np.array([0.6, 0.8]), np.diag([0.01, 0.01])
     found = effect.report(values, covariance)
     again = found["amplitude"].value * np.cos(12 * signals.q[:, 0] - found["phase"].value)

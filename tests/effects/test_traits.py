@@ -7,28 +7,14 @@ import numpy as np
 import pytest
 
 import excite_cli
-from excite_cli.effects.base import Effect, Tier
 from excite_cli.effects.catalogue import catalogue
-from excite_cli.robot.model import Robot
 from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
 
 KINDS = catalogue()
 NAMES = sorted(KINDS)
-STRAIGHT = ("viscous_friction", "coulomb_friction")
-APART = ({"backlash", "elasticity"}, {"friction_change", "covariate_friction"})
 PACKAGE = Path(excite_cli.__file__).parent
-
-
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return random_robot(9, joints=3, branches=False)
-
-
-def smallest(kind: type[Effect]) -> Effect:
-    """On as few joints as the kind takes, with its usual shape."""
-    joints = (0, 1) if kind.scope == "pair" else (0,)
-    return kind(joints, kind.planted(1.0, {})[0])
+ROBOT = random_robot(9, joints=3, branches=False)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -42,19 +28,6 @@ def test_traits_name_only_kinds_of_the_catalogue(name: str) -> None:
     assert not kind.known_by or kind.known_by in {p.name for p in kind.shapes}
 
 
-def test_what_every_robot_has_is_free_and_asked_for_first() -> None:
-    for name, kind in KINDS.items():
-        assert (kind.tier == Tier.EVERY_ROBOT) == (name in STRAIGHT)
-        assert (kind.prior_cost == 0.0) == (name in STRAIGHT)
-
-
-def test_kinds_that_come_near_anything_are_asked_for_last_and_dear() -> None:
-    dearest = max(kind.prior_cost for kind in KINDS.values() if kind.tier < Tier.LAST)
-    for name in ("contact", "cable_force", "friction_drift"):
-        assert KINDS[name].tier == Tier.LAST
-        assert KINDS[name].prior_cost >= dearest
-
-
 def test_what_is_refined_is_asked_for_before_or_with_its_refinement() -> None:
     """And is looked up by its kind and one joint: one of one joint, without shape, no parent."""
     for kind in KINDS.values():
@@ -63,12 +36,6 @@ def test_what_is_refined_is_asked_for_before_or_with_its_refinement() -> None:
             assert parent.scope == "joint"
             assert not parent.shapes
             assert not parent.refines
-
-
-@pytest.mark.parametrize("one", NAMES)
-def test_exclusion_holds_both_ways(one: str) -> None:
-    for other in NAMES:
-        assert KINDS[one].exclusive_with(KINDS[other]) == ({one, other} in APART)
 
 
 def test_exclusion_holds_both_ways_if_one_says_so() -> None:
@@ -82,8 +49,8 @@ def test_exclusion_holds_both_ways_if_one_says_so() -> None:
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if KINDS[name].same_as])
-def test_the_other_name_of_a_kind_is_the_same_columns(name: str, robot: Robot) -> None:
-    signals = signals_of(robot, 300)
+def test_the_other_name_of_a_kind_is_the_same_columns(name: str) -> None:
+    signals = signals_of(ROBOT, 300)
     own, others = (
         np.concatenate([KINDS[k]((1,)).columns(signals)[:, 0] for k in kinds], axis=1)
         for kinds in ((name,), KINDS[name].same_as)
@@ -93,45 +60,20 @@ def test_the_other_name_of_a_kind_is_the_same_columns(name: str, robot: Robot) -
     assert ranks == {own.shape[1]}
 
 
-def _texts(tree: ast.AST) -> list[str]:
-    return [
-        node.value
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Constant) and isinstance(node.value, str)
-    ]
-
-
-def _imports(tree: ast.AST) -> list[str]:
-    return [node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
-
-
 @pytest.mark.parametrize(
     "package", ["diagnosis", "simulation", "report", "identification", "export"]
 )
 def test_packages_above_know_no_kind_by_name(package: str) -> None:
     """A kind of a package is judged, simulated and drawn as one of ours is."""
-    own = {f"excite_cli.effects.{path.stem}" for path in (PACKAGE / "effects").glob("*.py")}
-    shared = {
-        "base",
-        "c_code",
-        "catalogue",
-        "mjcf_parts",
-        "place",
-        "placing",
-        "simulated_robot",
-        "parameter",
-        "seen",
-        "signals",
-        "sign",
-    }
-    of_kinds = own - {f"excite_cli.effects.{name}" for name in shared}
-    names = NAMES if package == "diagnosis" else []
+    of_kinds = {kind.__module__ for kind in KINDS.values()}
     files = sorted((PACKAGE / package).rglob("*.py"))
     assert files
     for path in files:
         source = path.read_text(encoding="utf-8")
-        tree = ast.parse(source)
-        assert not set(_imports(tree)) & of_kinds, path.name
-        assert not [name for name in names if name in source], path.name
+        nodes = list(ast.walk(ast.parse(source)))
+        assert not {n.module for n in nodes if isinstance(n, ast.ImportFrom)} & of_kinds, path.name
+        if package == "diagnosis":
+            assert not [name for name in NAMES if name in source], path.name
         if package in ("diagnosis", "simulation"):
-            assert not set(_texts(tree)) & (set(NAMES) - {"armature"}), path.name
+            texts = {n.value for n in nodes if isinstance(n, ast.Constant)}
+            assert not texts & (set(NAMES) - {"armature"}), path.name

@@ -27,13 +27,13 @@ from excite_cli.excitation.result import Result
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.robot.model import Robot
 from tests.cli.program import SMOKE
-from tests.diagnosis.test_held_out import motion
 
 pytest.importorskip("mujoco")
 
 from excite_cli.simulation.ground_truth import plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
+from tests.diagnosis.simulated_arm import motion
 
 for summarised in pkgutil.iter_modules(excite_cli.summary.__path__, "excite_cli.summary."):
     import_module(summarised.name)  # words are replaced in what is imported
@@ -140,7 +140,7 @@ def differences(one: Any, other: Any, where: str = "") -> list[str]:
 def recorded(robot: Robot) -> Dataset:
     """Three runs, an offset in the second; on the elbow a torque that no effect has by name."""
     names = ("take 1-6 s", "take 6-12 s", "take 7-18 s")
-    motions = [replace(motion(robot, k + 1), name=name) for k, name in enumerate(names)]
+    motions = [replace(motion(k + 1), name=name) for k, name in enumerate(names)]
     offset = plant(kind_named("torque_offset"), (1,), 6.0, {})
     offset = replace(offset, effect=replace(offset.effect, runs=(names[1],)))
     settings = SimulationSettings(rate=200.0, lead_in=0.5)

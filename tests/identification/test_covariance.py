@@ -43,19 +43,25 @@ def test_intervals_cover_the_truth_when_noise_remembers(method: str) -> None:
     assert np.mean(inside_naive) < 0.6
 
 
-def test_independent_noise_gives_the_usual_intervals() -> None:
+def test_how_many_samples_count() -> None:
+    """As many as there are without a memory, fewer with one."""
     rng = np.random.default_rng(6)
     runs = [slow_rows(rng, np.ones(COLUMNS), 0.0) for _ in range(2)]
     fit = fit_rows(runs)
     assert fit.samples == pytest.approx(fit.count.sum(), rel=0.35)
-
-
-def test_samples_that_remember_count_less() -> None:
+    # Samples that remember count less.
     rng = np.random.default_rng(7)
     runs = [slow_rows(rng, np.ones(COLUMNS), 0.9) for _ in range(2)]
     fit = fit_rows(runs)
     # (1 - a)/(1 + a) = 1/19 of them, for columns slower than the noise
     assert fit.count.sum() / 40 < fit.samples < fit.count.sum() / 5
+    # No sample counts twice. Noise that changes its sign from sample to sample hardly shows in slow
+    # columns.
+    rng = np.random.default_rng(5)
+    fit = fit_rows([slow_rows(rng, np.ones(COLUMNS), -0.9) for _ in range(3)])
+    white = fit_rows([slow_rows(rng, np.ones(COLUMNS), 0.0) for _ in range(3)])
+    assert fit.samples == fit.count.sum()
+    assert np.diag(fit.covariance).max() < np.diag(white.covariance).min()
 
 
 def test_the_noise_of_a_known_process_is_found() -> None:
@@ -77,21 +83,18 @@ def test_the_noise_of_a_known_process_is_found() -> None:
     assert noise.innovation == pytest.approx(expected, abs=0.07)
 
 
-def test_a_random_walk_has_a_finite_variance() -> None:
+def test_a_random_walk_and_a_hum_are_in_the_deviations() -> None:
     walk = np.cumsum(np.random.default_rng(2).normal(size=(800, 1)), axis=0)
     rows = Rows(np.ones((800, 1, 1)), walk, np.ones((800, 1), bool))
     fit = fit_rows([rows])
     assert np.isfinite(fit.covariance).all()
     assert fit.samples < 40
-
-
-def test_no_sample_counts_twice() -> None:
-    """Noise that changes its sign from sample to sample hardly shows in slow columns."""
-    rng = np.random.default_rng(5)
-    fit = fit_rows([slow_rows(rng, np.ones(COLUMNS), -0.9) for _ in range(3)])
-    white = fit_rows([slow_rows(rng, np.ones(COLUMNS), 0.0) for _ in range(3)])
-    assert fit.samples == fit.count.sum()
-    assert np.diag(fit.covariance).max() < np.diag(white.covariance).min()
+    # A hum is in the deviations. By the autoregression alone 82 % of intervals hold the truth, as
+    # if all began in silence.
+    rng = np.random.default_rng(8)
+    fits = [fit_rows([hummed(rng), hummed(rng)]) for _ in range(200)]
+    inside = [np.abs(fit.x) < 1.96 * np.sqrt(np.diag(fit.covariance)) for fit in fits]
+    assert 0.92 <= np.mean(inside) <= 0.99
 
 
 def hummed(rng: np.random.Generator) -> Rows:
@@ -105,14 +108,6 @@ def hummed(rng: np.random.Generator) -> Rows:
     tau = tone + 0.1 * rng.normal(size=len(t))
     columns = np.stack([speed, np.sign(speed)], axis=1)[:, None]
     return Rows(columns, tau[:, None], (np.abs(speed) > 0.05)[:, None])
-
-
-def test_a_hum_is_in_the_deviations() -> None:
-    """By the autoregression alone 82 % of intervals hold the truth, as if all began in silence."""
-    rng = np.random.default_rng(8)
-    fits = [fit_rows([hummed(rng), hummed(rng)]) for _ in range(200)]
-    inside = [np.abs(fit.x) < 1.96 * np.sqrt(np.diag(fit.covariance)) for fit in fits]
-    assert 0.92 <= np.mean(inside) <= 0.99
 
 
 def test_long_runs_are_taken_in_stretches(monkeypatch: pytest.MonkeyPatch) -> None:

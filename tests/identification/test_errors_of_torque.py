@@ -31,7 +31,7 @@ def errors(tau: np.ndarray, predicted: np.ndarray, **given: np.ndarray) -> Error
     return torque_errors(NAMES, runs, [predicted[part] for part in parts])
 
 
-def test_figures_by_hand() -> None:
+def test_figures_by_hand_and_masks_that_decide_what_counts() -> None:
     tau = np.column_stack([np.full(40, 4.0), np.tile([3.0, -3.0], 20)])
     predicted = tau + np.column_stack([np.full(40, 0.4), np.tile([0.0, 0.6], 20)])
     found = errors(tau, predicted, raw=tau - 1.0)
@@ -41,9 +41,7 @@ def test_figures_by_hand() -> None:
     assert found.rms["a"] == pytest.approx(0.4)
     assert found.rms_raw["a"] == pytest.approx(1.4)
     assert found.interval == pytest.approx((found.mean_relative, found.mean_relative))
-
-
-def test_masks_decide_what_counts() -> None:
+    # Masks decide what counts.
     rng = np.random.default_rng(0)
     tau = rng.normal(size=(60, 2))
     predicted = tau * 0.9

@@ -6,7 +6,6 @@ from scipy.signal import lfilter
 
 from excite_cli.identification.covariance import Rows
 from excite_cli.identification.hausman import hausman_test, instrument_dataset
-from excite_cli.identification.noise_floor import exact_period
 from excite_cli.measurement.dataset import Dataset, Run
 
 SAMPLES, JOINTS, COLUMNS = 800, 2, 4
@@ -26,39 +25,17 @@ def p_value(seed: int, feedback: float) -> float:
     return hausman_test([rows], [clean], "reference", np.ones(JOINTS)).p_value
 
 
-def test_no_alarm_in_open_loop() -> None:
+def test_feedback_of_the_noise_is_found_and_open_loop_is_no_alarm() -> None:
     p = [p_value(seed, 0.0) for seed in range(80)]
     assert np.mean(np.array(p) < 0.05) < 0.15
     assert np.mean(np.array(p) < 0.5) == pytest.approx(0.5, abs=0.2)
-
-
-def test_feedback_of_the_noise_is_found() -> None:
+    # Feedback of the noise is found.
     assert max(p_value(seed, 0.2) for seed in range(10)) < 0.01
 
 
 def wave(samples: int, period: float) -> np.ndarray:
     phase = 2 * np.pi * np.arange(samples) / period
     return np.column_stack([np.sin(phase), np.cos(2 * phase) + 0.3 * np.sin(3 * phase)])
-
-
-def test_the_period_is_found_and_only_where_there_is_one() -> None:
-    noise = 1e-3 * np.random.default_rng(0).normal(size=(1000, 2))
-    everywhere = np.ones(1000, dtype=bool)
-    assert exact_period(wave(1000, 240.0) + noise, everywhere) == pytest.approx(240, abs=1)
-    assert exact_period(wave(300, 240.0), everywhere[:300]) is None
-    assert exact_period(np.cumsum(noise, axis=0), everywhere) is None
-    assert exact_period(np.zeros((500, 2)), everywhere[:500]) is None
-
-
-def test_other_periods_leave_out_the_own_noise() -> None:
-    noise = 1e-3 * np.random.default_rng(1).normal(size=(960, 2))
-    run = Run("r", np.arange(960) * 0.01, wave(960, 240.0) + noise, np.zeros((960, 2)))
-    found, source, _ = instrument_dataset(Dataset(("a", "b"), (run,)))
-    assert source == "periods"
-    assert found is not None
-    other = found.runs[0].q - wave(960, 240.0)
-    assert abs(np.corrcoef(other[:, 0], noise[:, 0])[0, 1]) < 0.1
-    assert other.std() == pytest.approx(1e-3 / np.sqrt(3), rel=0.1)
 
 
 def test_instruments_come_from_the_reference_else_from_periods_else_not_at_all() -> None:
@@ -77,3 +54,12 @@ def test_instruments_come_from_the_reference_else_from_periods_else_not_at_all()
     assert np.abs(early.extra["q_ref"] - run.q).max() > 0.01
     periodic = replace(run, q=wave(1000, 250.0))
     assert instrument_dataset(replace(bare, runs=(periodic,)))[1] == "periods"
+    # Other periods leave out the own noise.
+    noise = 1e-3 * np.random.default_rng(1).normal(size=(960, 2))
+    run = Run("r", np.arange(960) * 0.01, wave(960, 240.0) + noise, np.zeros((960, 2)))
+    found, source, _ = instrument_dataset(Dataset(("a", "b"), (run,)))
+    assert source == "periods"
+    assert found is not None
+    other = found.runs[0].q - wave(960, 240.0)
+    assert abs(np.corrcoef(other[:, 0], noise[:, 0])[0, 1]) < 0.1
+    assert other.std() == pytest.approx(1e-3 / np.sqrt(3), rel=0.1)

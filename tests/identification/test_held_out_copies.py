@@ -61,10 +61,7 @@ def test_copies_are_refused(copy: Run) -> None:
 def test_the_message_says_which_files_and_how_much() -> None:
     with pytest.raises(FileError, match=r"\(copy.h5, a.h5\).*100% of what is held out"):
         judged(FIRST, SECOND, LATER)
-
-
-def test_whatever_part_of_a_longer_run_is_held_out() -> None:
-    """The copy is the longer one, and begins elsewhere."""
+    # Whatever part of a longer run is held out. The copy is the longer one, and begins elsewhere.
     with pytest.raises(FileError, match="'a' and 'copy'"):
         judged(FIRST.cut(101, 900), SECOND, LATER, held_out="a")
 

@@ -19,7 +19,6 @@ from excite_cli import (
 from excite_cli.api.load_planning import LoadProblem
 from excite_cli.api.loading import Case
 from excite_cli.config.data_spec import EffectSpec
-from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.identification.load import expected_load
 from excite_cli.identification.stored_model import StoredFit
@@ -30,28 +29,21 @@ from tests.cli.program import SMOKE, Program
 
 pytest.importorskip("mujoco")
 
-from excite_cli.simulation.ground_truth import Planted, plant
 from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
-from tests.diagnosis.test_changes import motion
+from tests.diagnosis.simulated_arm import ROBOT, SLIDE, Planted, planted, played
 
 MASS, CENTRE = 1.8, (0.03, -0.02, 0.06)
 DECLARED = "effects: [{kind: viscous_friction}, {kind: coulomb_friction}]\n"
 
 
-def friction(joints: int) -> list[Planted]:
-    return [
-        plant(kind_named(kind), (j,), 1.0)
-        for kind in ("viscous_friction", "coulomb_friction")
-        for j in range(joints)
-    ]
-
-
-def carried(joint: int, *runs: str) -> Planted:
-    others = dict(zip(("cx", "cy", "cz"), CENTRE, strict=True))
-    one = plant(kind_named("payload"), (joint,), MASS, others)
-    return replace(one, effect=replace(one.effect, runs=runs))
+def loaded_arm(*runs: int) -> list[Planted]:
+    """Friction of all joints, and the load in some runs."""
+    kinds = ("viscous_friction", "coulomb_friction")
+    friction = [planted(kind, j, 1.0) for kind in kinds for j in range(ROBOT.n)]
+    centre = dict(zip(("cx", "cy", "cz"), CENTRE, strict=True))
+    return [*friction, planted("payload", SLIDE, MASS, *runs, **centre)]
 
 
 @pytest.fixture(scope="module")
@@ -69,12 +61,9 @@ def case(folder: Path) -> Case:
 
 
 @pytest.fixture(scope="module")
-def runs(case: Case) -> Dataset:
+def runs() -> Dataset:
     """Four without a load, one with it."""
-    motions = [motion(case.robot, number) for number in range(1, 6)]
-    effects = [*friction(case.robot.n), carried(case.robot.n - 1, "r5")]
-    settings = SimulationSettings(rate=200.0, lead_in=0.5)
-    return simulate(case.robot, motions, settings, effects).dataset
+    return played(loaded_arm(5), range(1, 6), 4.0)
 
 
 @pytest.fixture(scope="module")
@@ -105,34 +94,32 @@ def test_mass_centre_and_inertia(case: Case, loaded: Dataset, fit: Path) -> None
         assert abs(told[name].value - value) < 4.0 * told[name].std, name
     assert [told[name].value for name in ("cx", "cy", "cz")] == pytest.approx(CENTRE, abs=3e-3)
     assert found.with_load.mean_relative_moving < 0.3 * found.without.mean_relative_moving
-
-
-def test_the_load_is_no_surer_than_the_robot(case: Case, loaded: Dataset, fit: Path) -> None:
-    """A fit with a hundred times the deviations makes a load that is less certain."""
+    assert found.findings == (), "a heavy load is no fault of the columns"
+    # The load is no surer than the robot nor than its model. However little noise: a thousandth of
+    # the mass, a tenth of a millimetre.
     stored = read_fit(fit)
-    vague = replace(stored, fit=replace(stored.fit, covariance=1e4 * stored.fit.covariance))
-    sure, less = (identify_load(case, loaded, each) for each in (stored, vague))
+    quiet, sure, vague = (
+        identify_load(
+            case,
+            loaded,
+            replace(stored, fit=replace(stored.fit, covariance=k * stored.fit.covariance)),
+        ).parameters
+        for k in (1e-8, 1.0, 1e4)
+    )
     for name in ("mass", "cx", "cy", "cz"):
-        assert less.parameters[name].std > 1.2 * sure.parameters[name].std
+        assert vague[name].std > 1.2 * sure[name].std
+    assert quiet["mass"].std >= 1e-3 * quiet["mass"].value
+    assert min(quiet[name].std for name in ("cx", "cy", "cz")) >= 1e-4
 
 
-def test_it_is_never_surer_than_its_model(case: Case, loaded: Dataset, fit: Path) -> None:
-    """However little noise there is: a thousandth of the mass, a tenth of a millimetre."""
-    stored = read_fit(fit)
-    quiet = replace(stored, fit=replace(stored.fit, covariance=1e-8 * stored.fit.covariance))
-    told = identify_load(case, loaded, quiet).parameters
-    assert told["mass"].std >= 1e-3 * told["mass"].value
-    assert min(told[name].std for name in ("cx", "cy", "cz")) >= 1e-4
-
-
-def test_nothing_carried_is_told_as_nothing(case: Case, runs: Dataset, fit: Path) -> None:
+def test_nothing_carried_is_told_as_nothing_and_a_changed_robot_as_that(
+    case: Case, runs: Dataset, fit: Path, loaded: Dataset
+) -> None:
     found = identify_load(case, replace(runs, runs=runs.runs[3:4]), fit)
     mass = found.parameters["mass"]
     assert abs(mass.value) < 4.0 * mass.std
     assert mass.std < 0.02
-
-
-def test_a_robot_that_changed_is_told(case: Case, loaded: Dataset, fit: Path) -> None:
+    # A robot that changed is told.
     last = loaded.runs[0]
     rubbing = replace(last, tau=last.tau + 8.0 * np.sign(last.q - last.q.mean(axis=0)))
     found = identify_load(case, replace(loaded, runs=(rubbing,)), fit)
@@ -167,31 +154,20 @@ def test_the_planned_motion_tells_a_load_as_well_as_expected(
 ) -> None:
     (step,) = plan(planned.problem).motions
     assert all(step.certified.values())
-    played = PlannedMotion("load", planned.problem.trajectory, step.coefficients)
-    robot = case.robot
+    motion_of_load = PlannedMotion("load", planned.problem.trajectory, step.coefficients)
     settings = SimulationSettings(rate=200.0, lead_in=0.5)
-    effects = [*friction(robot.n), carried(robot.n - 1, "load")]
-    data = simulate(robot, [played], settings, effects).dataset
+    data = simulate(ROBOT, [motion_of_load], settings, loaded_arm()).dataset
     told = identify_load(case, data, fit).parameters
     assert told["mass"].value == pytest.approx(MASS, rel=0.01)
     centre = [told[name].value for name in ("cx", "cy", "cz")]
     assert np.linalg.norm(np.subtract(centre, CENTRE)) < 3e-3
     assert 0.3 < told["mass"].std / planned.expected.mass_std < 3.0
-
-
-def test_a_problem_of_the_load_still_has_the_robots_parameters(
-    case: Case, runs: Dataset, loaded: Dataset, fit: Path, planned: LoadProblem
-) -> None:
+    # The problem of the load still has the robot's parameters.
     alone = replace(runs, runs=runs.runs[:4])
     assert planned.problem.base.rank == 10 < case.base.rank
     assert identify(planned.problem, alone).fit.rank == case.base.rank
-    assert identify_load(planned.problem, loaded, fit).parameters["mass"].value == pytest.approx(
-        MASS, rel=0.01
-    )
-
-
-def test_a_heavy_load_is_no_fault_of_the_columns(case: Case, loaded: Dataset, fit: Path) -> None:
-    assert {each.kind for each in identify_load(case, loaded, fit).findings} == set()
+    same = identify_load(planned.problem, replace(runs, runs=runs.runs[4:]), fit)
+    assert same.parameters["mass"].value == pytest.approx(MASS, rel=0.01)
 
 
 def test_what_is_expected_shrinks_with_time(case: Case, fit: Path, planned: LoadProblem) -> None:

@@ -36,7 +36,7 @@ def told(run: Run) -> dict[str, str]:
     return {each.kind: each.text for each in check_motion([run], processing, JOINTS)}
 
 
-def test_a_slow_rate() -> None:
+def test_slow_rates_and_coarse_positions() -> None:
     run = moved(12.0)
     errors = motion_errors([run], choose_processing([run], FilterSpec()))
     assert errors.lost == pytest.approx(measured(run), rel=0.5)
@@ -44,9 +44,7 @@ def test_a_slow_rate() -> None:
     assert "at 12 Hz" in text
     assert "Record at" in text
     assert "measurement.filter.position" in text
-
-
-def test_coarse_positions() -> None:
+    # Coarse positions.
     run = moved(125.0, 2 * np.pi / 1024)
     errors = motion_errors([run], choose_processing([run], FilterSpec()))
     assert errors.counts == pytest.approx(2 * np.pi / 1024)

@@ -8,18 +8,17 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from excite_cli.config.data_spec import FilterSpec
-from excite_cli.config.load import load_spec, parse_spec
+from excite_cli.config.load import parse_spec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.identification.identify import identify
-from excite_cli.identification.noise_floor import exact_period, noise_floor
+from excite_cli.identification.noise_floor import NoiseFloor, exact_period, noise_floor
 from excite_cli.identification.processing import Processing, choose_processing
 from excite_cli.identification.split import split
 from excite_cli.measurement.dataset import Dataset, Run
-from excite_cli.robot.model import Array, Robot, build_robot
-from excite_cli.trajectory.fourier import FourierTrajectory
-from tests.cli.program import SMOKE
+from excite_cli.robot.model import Array
+from tests.diagnosis.simulated_arm import ELBOW, ROBOT, planted, played
 from tests.identification.synthetic import measured, torque
 from tests.robot.random_robots import random_robot
 
@@ -40,6 +39,19 @@ def left_of_white_noise(processing: Processing, rate: float) -> float:
     return float(gaussian_filter1d(white, width).std())
 
 
+def floor_of(runs: Sequence[Run], processing: Processing) -> NoiseFloor:
+    found = noise_floor(runs, processing)
+    assert found is not None
+    return found
+
+
+def simulated(period: float, count: int, noise: float, kind: str, value: float) -> Sequence[Run]:
+    """Motions, four periods each, on an arm with an effect that the model knows nothing of."""
+    effects = [planted(kind, ELBOW, value)]
+    how = {"rate": RATE, "periods": PERIODS, "torque_noise": noise}
+    return played(effects, range(1, count + 1), period, **how).runs
+
+
 def waves(
     period: float, seconds: float, noise: float = 0.0, seed: int = 0, rate: float = RATE
 ) -> Run:
@@ -55,54 +67,23 @@ def waves(
     return Run("run", t, q, tau + noise * rng.normal(size=q.shape))
 
 
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return build_robot(load_spec(SMOKE).robot, SMOKE.parent)
-
-
-def simulated(
-    robot: Robot, period: float, count: int, noise: float, kind: str, value: float
-) -> Dataset:
-    """Motions, four periods each, on an arm with an effect that the model knows nothing of."""
-    pytest.importorskip("mujoco")
-    from excite_cli.simulation.ground_truth import plant
-    from excite_cli.simulation.planned_motion import PlannedMotion
-    from excite_cli.simulation.settings import SimulationSettings
-    from excite_cli.simulation.simulate import simulate
-
-    trajectory = FourierTrajectory(4, 2 * np.pi / period)
-    lower, upper = robot.limits.ranges()
-    motions = []
-    for number in range(1, count + 1):
-        rng = np.random.default_rng(number)
-        size = 0.04 * (upper - lower)
-        coefficients = rng.normal(size=(trajectory.n_coefficients, robot.n)) * size
-        coefficients[-1] = (lower + upper) / 2
-        motions.append(PlannedMotion(f"motion_{number}", trajectory, coefficients))
-    settings = SimulationSettings(rate=RATE, periods=PERIODS, torque_noise=noise, lead_in=0.5)
-    planted = plant(kind_named(kind), (2,), value, {})
-    return simulate(robot, motions, settings, [planted]).dataset
-
-
 @pytest.mark.parametrize("period", [WHOLE, BROKEN])
-def test_the_simulators_noise_comes_back_whatever_repeats(robot: Robot, period: float) -> None:
+def test_the_simulators_noise_comes_back_whatever_repeats(period: float) -> None:
     noise = 0.02
-    runs = simulated(robot, period, 2, noise, "coulomb_friction", 3.0).runs
+    runs = simulated(period, 2, noise, "coulomb_friction", 3.0)
     processing = processing_of(runs)
     recorded = np.mean([np.mean(run.tau**2, axis=0) for run in runs], axis=0)
     planted = noise * np.sqrt(recorded / (1 + noise**2))  # a share of the torque without noise
-    found = noise_floor(runs, processing)
-    assert found is not None
+    found = floor_of(runs, processing)
     expected = planted * left_of_white_noise(processing, RATE)
     np.testing.assert_allclose(found.rms, expected, rtol=0.1)
-    assert not found.noticed(robot.joint_names)
+    assert not found.noticed(ROBOT.joint_names)
 
 
-def test_friction_that_drifts_raises_the_floor_of_its_joint_only(robot: Robot) -> None:
+def test_friction_that_drifts_raises_the_floor_of_its_joint_only() -> None:
     rate = -0.1  # N·m/s
-    runs = simulated(robot, WHOLE, 1, 1e-4, "friction_drift", rate).runs
-    found = noise_floor(runs, processing_of(runs))
-    assert found is not None
+    runs = simulated(WHOLE, 1, 1e-4, "friction_drift", rate)
+    found = floor_of(runs, processing_of(runs))
     # Where the joint moves, periods differ by rate · period, one after the other.
     drift = abs(rate) * WHOLE * np.std(np.arange(PERIODS), ddof=1)
     assert found.rms[2] == pytest.approx(drift, rel=0.15)
@@ -115,23 +96,9 @@ def test_friction_that_drifts_raises_the_floor_of_its_joint_only(robot: Robot) -
 def test_any_filter_and_any_period(period: float, parallel: object) -> None:
     run = waves(period, PERIODS * period + 0.7, noise=1.0)
     processing = processing_of([run], parallel)
-    found = noise_floor([run], processing)
-    assert found is not None
+    found = floor_of([run], processing)
     expected = left_of_white_noise(processing, RATE)
     np.testing.assert_allclose(found.rms, expected, rtol=0.1)
-
-
-def test_without_a_filter_it_is_the_sample_variance() -> None:
-    run = waves(2.0, 3 * 2.0 + 0.1, noise=0.5)  # 6 s are compared, up to the borders
-    processing = replace(processing_of([run], "none"), rate=RATE)
-    found = noise_floor([run], processing)
-    margin, period = 2, round(2.0 * RATE)
-    phases = run.tau[margin : margin + 3 * period].reshape(3, period, 2)
-    assert found is not None
-    # Of the last 0.1 s there are four copies: a few phases more than plain NumPy sees.
-    np.testing.assert_allclose(
-        found.rms, np.sqrt(phases.var(axis=0, ddof=1).mean(axis=0)), rtol=0.02
-    )
 
 
 def test_no_floor_without_two_periods() -> None:
@@ -140,81 +107,7 @@ def test_no_floor_without_two_periods() -> None:
     robot = random_robot(3, joints=2)
     data = measured(robot, standard_parameters(robot), noise=0.1, seeds=(1, 2))
     assert noise_floor(data.runs, processing_of(data.runs)) is None
-
-
-def test_a_constant_drift_is_part_of_the_floor_to_the_digit() -> None:
-    run = waves(WHOLE, PERIODS * WHOLE)
-    drifting = replace(run, tau=run.tau + 0.3 * run.t[:, None])
-    short = replace(processing_of([run]), rate=20.0)
-    found, plain = noise_floor([drifting], short), noise_floor([run], short)
-    assert found is not None
-    assert plain is not None
-    per_period = 0.3 * WHOLE
-    assert (plain.rms < 1e-3 * per_period).all()
-    assert found.rms == pytest.approx(per_period * np.sqrt(5 / 3), rel=0.02)
-
-
-@pytest.mark.parametrize("others", [0, 1])
-def test_parts_of_a_run_say_what_the_run_says(others: int) -> None:
-    """Held-out blocks leave gaps; of two runs, one is halved."""
-    run = waves(BROKEN, PERIODS * BROKEN, noise=1.0)
-    held_out = [replace(run, name=f"held_out_{k}") for k in range(others)]
-    parts = split(Dataset(("a", "b"), (run, *held_out)))
-    assert len(parts.training) == (2 if others else 4)
-    processing = processing_of(parts.training)
-    found = noise_floor(parts.training, processing)
-    assert found is not None
-    whole = noise_floor([run], processing)
-    assert whole is not None
-    np.testing.assert_allclose(found.rms, whole.rms, rtol=1e-9 if others else 0.15)
-
-
-def test_invalid_samples_do_not_count() -> None:
-    run = waves(WHOLE, PERIODS * WHOLE, noise=1.0)
-    bad = np.zeros(run.tau.shape, bool)
-    bad[700:760, 0] = bad[2100:2103, 1] = True
-    masked = replace(run, tau=np.where(bad, np.nan, run.tau), valid=~bad)
-    processing = processing_of([run])
-    found, all_of_it = noise_floor([masked], processing), noise_floor([run], processing)
-    assert found is not None
-    assert all_of_it is not None
-    np.testing.assert_allclose(found.rms, all_of_it.rms, rtol=0.03)
-    counted = noise_floor([replace(masked, tau=np.where(bad, 500.0, run.tau))], processing)
-    assert counted is not None
-    np.testing.assert_array_equal(counted.rms, found.rms)
-    silent = replace(run, valid=np.array([True, False]) & ~bad)
-    one = noise_floor([silent], processing)
-    assert one is not None
-    assert list(one.named(("a", "b"))) == ["a"]
-
-
-def test_runs_are_combined_by_their_squares() -> None:
-    quiet = waves(WHOLE, PERIODS * WHOLE, noise=0.2, seed=1)
-    loud = waves(BROKEN, PERIODS * BROKEN, noise=1.0, seed=2)
-    single = waves(WHOLE, 1.5 * WHOLE, noise=9.0, seed=3)  # not repeated: does not count
-    processing = processing_of([quiet, loud])
-    floors = [noise_floor(runs, processing) for runs in ([quiet], [loud], [quiet, single, loud])]
-    one, other, both = (floor.rms for floor in floors if floor is not None)
-    np.testing.assert_allclose(both, np.sqrt((one**2 + other**2) / 2), rtol=0.01)
-
-
-def test_periods_that_begin_unevenly_are_told() -> None:
-    """A pause of 4, 0 and 7 ms between periods: the torque differs because the motion is late."""
-    run = waves(WHOLE, PERIODS * WHOLE, rate=1000.0)
-    starts = np.repeat([0.0, 0.004, 0.004, 0.011], round(WHOLE * 1000.0))
-
-    def late(x: Array) -> Array:
-        return np.column_stack([np.interp(run.t - starts, run.t, column) for column in x.T])
-
-    uneven = replace(run, q=late(run.q), tau=late(run.tau))
-    found = noise_floor([uneven], processing_of([uneven]))
-    assert found is not None
-    (told,) = found.noticed(("a", "b"))
-    assert (told.kind, told.severity, told.joints) == ("uneven_periods", "note", ("a", "b"))
-    np.testing.assert_allclose(found.misalignment, found.rms, rtol=0.2)
-
-
-def test_the_period_to_a_fraction_of_a_sample() -> None:
+    # The period to a fraction of a sample.
     rng = np.random.default_rng(4)
     for period in (WHOLE, BROKEN, 3.33712):
         run = waves(period, 3.4 * period)
@@ -226,6 +119,69 @@ def test_the_period_to_a_fraction_of_a_sample() -> None:
         assert exact_period(q, known) == pytest.approx(period * RATE, abs=0.01)
     assert exact_period(np.cumsum(rng.normal(size=(1000, 2)), axis=0), np.ones(1000, bool)) is None
     assert exact_period(np.zeros((1000, 2)), np.ones(1000, bool)) is None
+
+
+def test_a_constant_drift_is_part_of_the_floor_to_the_digit() -> None:
+    run = waves(WHOLE, PERIODS * WHOLE)
+    drifting = replace(run, tau=run.tau + 0.3 * run.t[:, None])
+    short = replace(processing_of([run]), rate=20.0)
+    found, plain = floor_of([drifting], short), noise_floor([run], short)
+    assert found is not None
+    per_period = 0.3 * WHOLE
+    assert (plain.rms < 1e-3 * per_period).all()
+    assert found.rms == pytest.approx(per_period * np.sqrt(5 / 3), rel=0.02)
+    # Runs are combined by their squares.
+    quiet = waves(WHOLE, PERIODS * WHOLE, noise=0.2, seed=1)
+    loud = waves(BROKEN, PERIODS * BROKEN, noise=1.0, seed=2)
+    single = waves(WHOLE, 1.5 * WHOLE, noise=9.0, seed=3)  # not repeated: does not count
+    processing = processing_of([quiet, loud])
+    every = ([quiet], [loud], [quiet, single, loud])
+    one, other, both = (floor_of(runs, processing).rms for runs in every)
+    np.testing.assert_allclose(both, np.sqrt((one**2 + other**2) / 2), rtol=0.01)
+
+
+@pytest.mark.parametrize("others", [0, 1])
+def test_parts_of_a_run_say_what_the_run_says(others: int) -> None:
+    """Held-out blocks leave gaps; of two runs, one is halved."""
+    run = waves(BROKEN, PERIODS * BROKEN, noise=1.0)
+    held_out = [replace(run, name=f"held_out_{k}") for k in range(others)]
+    parts = split(Dataset(("a", "b"), (run, *held_out)))
+    assert len(parts.training) == (2 if others else 4)
+    processing = processing_of(parts.training)
+    found = floor_of(parts.training, processing)
+    whole = floor_of([run], processing)
+    np.testing.assert_allclose(found.rms, whole.rms, rtol=1e-9 if others else 0.15)
+
+
+def test_invalid_samples_do_not_count() -> None:
+    run = waves(WHOLE, PERIODS * WHOLE, noise=1.0)
+    bad = np.zeros(run.tau.shape, bool)
+    bad[700:760, 0] = bad[2100:2103, 1] = True
+    masked = replace(run, tau=np.where(bad, np.nan, run.tau), valid=~bad)
+    processing = processing_of([run])
+    found, all_of_it = floor_of([masked], processing), noise_floor([run], processing)
+    assert found is not None
+    np.testing.assert_allclose(found.rms, all_of_it.rms, rtol=0.03)
+    counted = floor_of([replace(masked, tau=np.where(bad, 500.0, run.tau))], processing)
+    np.testing.assert_array_equal(counted.rms, found.rms)
+    silent = replace(run, valid=np.array([True, False]) & ~bad)
+    one = floor_of([silent], processing)
+    assert list(one.named(("a", "b"))) == ["a"]
+
+
+def test_periods_that_begin_unevenly_are_told() -> None:
+    """A pause of 4, 0 and 7 ms between periods: the torque differs because the motion is late."""
+    run = waves(WHOLE, PERIODS * WHOLE, rate=1000.0)
+    starts = np.repeat([0.0, 0.004, 0.004, 0.011], round(WHOLE * 1000.0))
+
+    def late(x: Array) -> Array:
+        return np.column_stack([np.interp(run.t - starts, run.t, column) for column in x.T])
+
+    uneven = replace(run, q=late(run.q), tau=late(run.tau))
+    found = floor_of([uneven], processing_of([uneven]))
+    (told,) = found.noticed(("a", "b"))
+    assert (told.kind, told.severity, told.joints) == ("uneven_periods", "note", ("a", "b"))
+    np.testing.assert_allclose(found.misalignment, found.rms, rtol=0.2)
 
 
 def test_a_complete_model_leaves_the_floor_and_an_incomplete_one_more() -> None:

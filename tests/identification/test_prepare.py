@@ -8,7 +8,7 @@ import pytest
 from excite_cli.config.data_spec import FilterSpec
 from excite_cli.errors import FileError
 from excite_cli.identification.prepare import PreparedRun, prepare
-from excite_cli.identification.processing import Processing, choose_processing
+from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.dataset import Array, Run
 
 STEP_OF_ENCODER = 2e-5
@@ -43,21 +43,16 @@ def relative(x: Array, truth: Array) -> float:
 
 @pytest.mark.parametrize("fs", [100.0, 500.0, 1000.0])
 def test_motion_is_recovered_through_the_encoder(fs: float) -> None:
-    run = recorded(fs)
-    found = ready(run)
+    found = ready(recorded(fs))
     q, v, a = fourier(found.t)
     assert relative(found.q, q) < 1e-4
     assert relative(found.v, v) < 2e-3
     assert relative(found.a, a) < 2e-2
-    averaged = found.averaged(found.a)
-    assert relative(averaged, found.averaged(a)) < 1e-2
-
-
-def test_filters_do_not_shift_in_time() -> None:
-    found = ready(recorded(encoder=0.0))
-    _, v, a = fourier(found.t)
-    lag = np.sum((v - found.v) * a) / np.sum(a**2)
-    assert abs(lag) < 1e-5  # s
+    assert relative(found.averaged(found.a), found.averaged(a)) < 1e-2
+    assert relative(found.averaged(found.tau_raw), found.tau) < 1e-3, "at both rates"
+    exact = ready(recorded(fs, encoder=0.0))
+    _, v, a = fourier(exact.t)
+    assert abs(np.sum((v - exact.v) * a) / np.sum(a**2)) < 1e-5, "no shift in time [s]"
 
 
 @pytest.mark.parametrize("fs", [100.0, 500.0, 997.0])
@@ -75,20 +70,18 @@ def test_torque_and_columns_are_averaged_around_the_same_instants(
     assert np.diff(centers) == pytest.approx(found.step, abs=1e-12)
 
 
-def test_averages_of_a_smooth_torque_agree_at_both_rates() -> None:
-    found = ready(recorded(1000.0))
-    assert len(found.t) < 0.4 * 10_000  # the working rate is lower
-    assert relative(found.averaged(found.tau_raw), found.tau) < 1e-3
-
-
 def test_averaging_commutes_with_the_linear_model() -> None:
+    """Of all samples, and of those that fits use."""
     found = ready(recorded())
     rng = np.random.default_rng(0)
     columns, x = rng.normal(size=(len(found.t), 2, 7)), rng.normal(size=7)
-    left, right = found.averaged(columns) @ x, found.averaged(columns @ x)
-    assert left.shape == found.tau.shape
-    assert np.abs(left - right).max() < 1e-13
+    for average in (found.averaged, found.averaged_for_fit):
+        left = average(columns) @ x
+        assert left.shape == found.tau.shape
+        assert np.abs(left - average(columns @ x)).max() < 1e-12
     assert found.averaged(np.ones(len(found.t))) == pytest.approx(1.0, abs=1e-13)
+    second = found.averaged_for_fit(columns[:, 1:], [1])
+    assert np.array_equal(second, found.averaged_for_fit(columns)[:, 1:])
 
 
 def test_averages_lower_white_noise_without_folding_it() -> None:
@@ -102,7 +95,7 @@ def test_averages_lower_white_noise_without_folding_it() -> None:
     assert found.tau.std() == pytest.approx(expected, rel=0.1)
 
 
-def test_borders_are_cut() -> None:
+def test_borders_are_cut_and_measured_speeds_used_when_asked_for() -> None:
     run = recorded()
     found = ready(run, border=1.0)
     assert found.t[0] == pytest.approx(1.0)
@@ -111,6 +104,13 @@ def test_borders_are_cut() -> None:
     centers = found.averaged(found.t)
     assert centers[0] > 1.0
     assert centers[-1] < run.t[-1] - 1.0
+    # Measured speeds are used when asked for.
+    run = recorded(encoder=0.0)
+    assert run.dq is not None
+    found = ready(replace(run, dq=2 * run.dq), velocity="measured")
+    _, v, a = fourier(found.t)
+    assert relative(found.v, 2 * v) < 1e-3
+    assert relative(found.a, 2 * a) < 5e-3
 
 
 @pytest.mark.parametrize("fs", [100.0, 500.0, 997.0])
@@ -126,16 +126,6 @@ def test_what_fits_leave_out_they_leave_out_of_torque_and_columns_alike(fs: floa
     found = ready(replace(run, valid=hole))
     modelled = found.averaged_for_fit(found.tau_raw)[found.usable]
     assert relative(modelled, found.tau_fit[found.usable]) < 1e-5
-
-
-def test_the_linear_model_holds_for_averages_of_fits() -> None:
-    found = ready(recorded())
-    rng = np.random.default_rng(0)
-    columns, x = rng.normal(size=(len(found.t), 2, 7)), rng.normal(size=7)
-    left = found.averaged_for_fit(columns) @ x
-    assert np.abs(left - found.averaged_for_fit(columns @ x)).max() < 1e-12
-    second = found.averaged_for_fit(columns[:, 1:], [1])
-    assert np.array_equal(second, found.averaged_for_fit(columns)[:, 1:])
 
 
 def test_an_invalid_sample_costs_its_weight_and_touches_nothing() -> None:
@@ -209,26 +199,14 @@ def test_what_a_joint_does_while_it_sticks_takes_no_part_in_fits(
         assert found.tau_fit[found.usable[:, j], j].any() == seen
 
 
-def test_measured_speeds_are_used_when_asked_for() -> None:
-    run = recorded(encoder=0.0)
-    assert run.dq is not None
-    found = ready(replace(run, dq=2 * run.dq), velocity="measured")
-    _, v, a = fourier(found.t)
-    assert relative(found.v, 2 * v) < 1e-3
-    assert relative(found.a, 2 * a) < 5e-3
-
-
-def test_a_run_too_short_is_refused_in_words() -> None:
+def test_runs_too_short_or_too_slow_are_refused_in_words() -> None:
+    """Cut-offs are chosen from the training runs; the held-out one may have another rate."""
     run = recorded()
     processing = choose_processing([run], FilterSpec())
     with pytest.raises(FileError, match=r"run 'brief' is too short: 0\.598 s leave \d averaged"):
         prepare(replace(run, name="brief").cut(0, 300), processing)
     with pytest.raises(FileError, match="only 9 samples"):
         prepare(replace(run, name="brief").cut(0, 9), processing)
-
-
-def test_a_run_too_slow_for_the_cutoff_is_refused_in_words() -> None:
-    """Cut-offs are chosen from the training runs; the held-out one may have another rate."""
-    processing: Processing = choose_processing([recorded(500.0)], FilterSpec(position=30.0))
+    fine = choose_processing([run], FilterSpec(position=30.0))
     with pytest.raises(FileError, match=r"run 'r' was recorded at 50 Hz: too slow .* 30 Hz"):
-        prepare(recorded(50.0), processing)
+        prepare(recorded(50.0), fine)

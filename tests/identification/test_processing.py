@@ -64,7 +64,17 @@ def test_runs_of_several_rates_have_a_cutoff_that_the_slowest_can_bear(
     assert found.bandwidth == pytest.approx(alone.bandwidth, abs=0.45)
 
 
-def test_more_noise_gives_a_lower_cutoff_of_the_positions() -> None:
+def test_what_is_given_is_taken() -> None:
+    found = chosen(run_of(500.0, 1.0), position=20.0, parallel=6.0, rate=30.0, border=0.7)
+    assert (found.position_cutoff, found.parallel_cutoff) == (20.0, 6.0)
+    assert (found.rate, found.border) == (30.0, 0.7)
+    plain = chosen(run_of(500.0, 1.0), position="none", parallel="none")
+    assert (plain.position_cutoff, plain.parallel_cutoff) == (None, None)
+    assert (plain.rate, plain.working_stride) == (500.0, 1)
+    # Measured speeds must be there.
+    with pytest.raises(ConfigError, match="'measured' needs recorded speeds"):
+        chosen(run_of(100.0, 1.0), velocity="measured")
+    # More noise gives a lower cutoff of the positions.
     fine, coarse = (chosen(run_of(500.0, 1.0, noise=x)).position_cutoff for x in (1e-9, 1e-2))
     assert fine is not None
     assert coarse is not None
@@ -79,22 +89,8 @@ def test_the_gaussian_is_3_db_down_at_its_cutoff() -> None:
     assert response == pytest.approx(1 / np.sqrt(2), rel=1e-6)
 
 
-def test_what_is_given_is_taken() -> None:
-    found = chosen(run_of(500.0, 1.0), position=20.0, parallel=6.0, rate=30.0, border=0.7)
-    assert (found.position_cutoff, found.parallel_cutoff) == (20.0, 6.0)
-    assert (found.rate, found.border) == (30.0, 0.7)
-    plain = chosen(run_of(500.0, 1.0), position="none", parallel="none")
-    assert (plain.position_cutoff, plain.parallel_cutoff) == (None, None)
-    assert (plain.rate, plain.working_stride) == (500.0, 1)
-
-
 @pytest.mark.parametrize("which", ["position", "parallel"])
 def test_cutoffs_beyond_half_the_rate_are_refused(which: str) -> None:
     with pytest.raises(ConfigError, match=rf"filter\.{which}: 50 Hz is beyond half .*100 Hz"):
         chosen(run_of(100.0, 1.0), **{which: 50.0})
     assert getattr(chosen(run_of(100.0, 1.0), **{which: 49.0}), f"{which}_cutoff") == 49.0
-
-
-def test_measured_speeds_must_be_there() -> None:
-    with pytest.raises(ConfigError, match="'measured' needs recorded speeds"):
-        chosen(run_of(100.0, 1.0), velocity="measured")

@@ -8,7 +8,7 @@ import pytest
 from excite_cli.config.data_spec import FilterSpec
 from excite_cli.errors import ConfigError
 from excite_cli.identification.processing import choose_processing
-from excite_cli.identification.split import Split, split, with_ends_held_out
+from excite_cli.identification.split import split, with_ends_held_out
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.measurement.run_identity import Part
 
@@ -40,7 +40,15 @@ def test_the_last_run_is_held_out_or_the_one_that_is_named() -> None:
     assert [each.name for each in named.training] == ["two", "three"]
 
 
-def test_an_unknown_run_is_named_with_the_nearest() -> None:
+def test_names_are_never_taken_apart() -> None:
+    """Names that look like those of parts are names like others."""
+    names = ("take 6-12 s", "take (first half)", "take/2", "take")
+    found = split(data(*(run(name, 5.0) for name in names)))
+    assert found.units == names
+    assert [found.unit(each.id) for each in found.training] == list(names[:3])
+    (only,) = split(data(run("take 6-12 s", 20.0))).units
+    assert only == "take 6-12 s"
+    # An unknown run is named with the nearest.
     with pytest.raises(ConfigError) as error:
         split(data(run("slow", 2.0), run("payload", 2.0)), "paylod")
     text = str(error.value)
@@ -48,14 +56,6 @@ def test_an_unknown_run_is_named_with_the_nearest() -> None:
     assert "Runs: slow, payload." in text
     with pytest.raises(ConfigError, match="no run 'b'"):
         split(data(run("motion_1", 20.0)), "b")
-
-
-def test_of_two_runs_the_one_that_trains_is_halved_for_folds() -> None:
-    found = split(data(run("one", 5.0), run("two", 4.0)))
-    assert found.folds == (0, 1)
-    assert numbers(found.training) == list(range(500))
-    assert len(found.training[0].t) == 250
-    assert found.held_out_name == "two"
 
 
 @pytest.mark.parametrize("seconds", [3.0, 5.0, 12.0, 17.3, 60.0, 200.0])
@@ -91,14 +91,6 @@ def test_parts_of_a_slow_recording_are_long_enough_for_its_filters(
         assert len(part.t) >= 32
 
 
-def test_a_long_run_has_held_out_blocks_all_over() -> None:
-    found = split(data(run("only", 60.0)))
-    middles = [float(each.t.mean()) for each in found.held_out]
-    assert len(middles) == 10
-    assert np.diff(middles) == pytest.approx(6.0, abs=0.1)
-    assert max(found.folds) == 3
-
-
 def test_a_run_too_short_for_blocks_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"run 'only' lasts 1\.99 s: too short to hold out"):
         split(data(run("only", 2.0)))
@@ -128,49 +120,13 @@ def test_a_recording_with_a_gap_is_held_out_and_left_out_as_one() -> None:
     assert [each.label for each in stretch.training] == ["a", "b/1", "c"]
     # On the clock of the recording, so that a time within it means the same in all stretches.
     assert found.training[2].t[0] == pytest.approx(4.3)
-
-
-def test_stretches_of_the_only_recording_count_as_recordings() -> None:
+    # Stretches of the only recording count as recordings.
     runs = data(*with_gap("only", (0.0, 4.0), (4.3, 8.0), (9.0, 12.0)))
     for held_out in (None, "only", "only/3"):
         found = split(runs, held_out)
         assert [each.label for each in found.held_out] == ["only/3"]
         assert (found.held_out_name, found.folds) == ("only/3", (0, 1))
         assert found.units == ("only/1", "only/2", "only/3")
-
-
-def test_names_are_never_taken_apart() -> None:
-    """Names that look like those of parts are names like others."""
-    names = ("take 6-12 s", "take (first half)", "take/2", "take")
-    found = split(data(*(run(name, 5.0) for name in names)))
-    assert found.units == names
-    assert [found.unit(each.id) for each in found.training] == list(names[:3])
-    (only,) = split(data(run("take 6-12 s", 20.0))).units
-    assert only == "take 6-12 s"
-
-
-def test_parts_say_where_they_are() -> None:
-    found = split(data(run("only", 12.0)))
-    first = found.held_out[0]
-    assert first.part.start == pytest.approx(first.t[0])
-    assert first.part.end == pytest.approx(first.t[-1])
-    assert first.label == f"only {first.t[0]:.4g}-{first.t[-1]:.4g} s"
-    numbers = sorted(each.part.block for each in (*found.training, *found.held_out))
-    assert numbers == sorted(set(numbers))
-
-
-def test_absolute_time_stays_with_its_instant() -> None:
-    late = replace(run("one", 3.0, start=5.0), epoch=1.7e9)
-    found = split(data(late, run("two", 3.0)))
-    first, second = found.training
-    assert (first.epoch, second.epoch) == (1.7e9 + 5.0, 1.7e9 + 5.0)
-
-
-def test_time_counts_from_the_start_of_the_run() -> None:
-    found: Split = split(data(run("one", 3.0, start=1e5), run("two", 3.0, start=2e5)))
-    assert found.training[0].t[0] == 0.0
-    assert found.held_out[0].t[0] == 0.0
-    assert found.training[1].t[0] == pytest.approx(1.5)
 
 
 def test_ends_of_some_runs_are_held_out_a_border_away_from_the_rest() -> None:
@@ -197,8 +153,28 @@ def test_an_end_lasts_a_second_at_least_and_leaves_as_much(seconds: float, held_
     assert len(found.ends) == (held_out > 0)
 
 
-def test_the_campaign_goes_on_from_run_to_run() -> None:
-    found = split(data(run("one", 3.0, start=7.0), run("two", 3.0), run("three", 3.0)))
-    assert [each.start for each in (*found.training, *found.held_out)] == pytest.approx(
-        [0.0, 2.99, 5.98]
-    )
+def test_clocks_of_parts() -> None:
+    """Of two runs the one that trains is halved; each keeps its instants, from its own start."""
+    first = replace(run("one", 5.0, start=1e5), epoch=1.7e9)
+    found = split(data(first, run("two", 4.0, start=2e5)))
+    assert (found.folds, found.held_out_name) == ((0, 1), "two")
+    assert numbers(found.training) == list(range(500))
+    assert [each.t[0] for each in found.training] == pytest.approx([0.0, 2.5])
+    assert found.held_out[0].t[0] == 0.0
+    assert [each.epoch for each in found.training] == [1.7e9 + 1e5] * 2
+    campaign = split(data(run("one", 3.0, start=7.0), run("two", 3.0), run("three", 3.0)))
+    starts = [each.start for each in (*campaign.training, *campaign.held_out)]
+    assert starts == pytest.approx([0.0, 2.99, 5.98])
+
+
+def test_held_out_blocks_are_all_over_a_long_run_and_say_where_they_are() -> None:
+    found = split(data(run("only", 60.0)))
+    middles = [float(each.t.mean()) for each in found.held_out]
+    assert len(middles) == 10
+    assert np.diff(middles) == pytest.approx(6.0, abs=0.1)
+    assert max(found.folds) == 3
+    first = found.held_out[0]
+    assert (first.part.start, first.part.end) == pytest.approx((first.t[0], first.t[-1]))
+    assert first.label == f"only {first.t[0]:.4g}-{first.t[-1]:.4g} s"
+    blocks = sorted(each.part.block for each in (*found.training, *found.held_out))
+    assert blocks == sorted(set(blocks))

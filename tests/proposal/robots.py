@@ -36,14 +36,22 @@ GOOD = 'lower="-2" upper="2" velocity="3" effort="50"'
 
 def arm(folder: Path, first: str = GOOD, second: str = GOOD, mass: float = 1.0) -> Path:
     """Two links on a base, with the limits given for its two joints."""
-    return written(
-        folder,
-        link("base", mass),
-        joint("shoulder", "base", "upper", first),
-        link("upper", mass),
-        joint("elbow", "upper", "lower", second),
-        link("lower", mass),
-    )
+    links = {name: link(name, mass) for name in ("base", "upper", "lower")}
+    limits = {
+        "shoulder": joint("shoulder", "base", "upper", first),
+        "elbow": joint("elbow", "upper", "lower", second),
+    }
+    return serial(folder, "base shoulder upper elbow lower", **links, **limits)
+
+
+def serial(folder: Path, names: str, *more: str, **own: str) -> Path:
+    """A chain: link, joint, link … by their names, as usual but for one's `own` elements."""
+    words = names.split()
+    parts = []
+    for k, name in enumerate(words):
+        usual = joint(name, words[k - 1], words[k + 1], GOOD) if k % 2 else link(name)
+        parts.append(own.get(name, usual))
+    return written(folder, *parts, *more)
 
 
 def written(folder: Path, *parts: str) -> Path:
@@ -54,3 +62,15 @@ def written(folder: Path, *parts: str) -> Path:
 
 def surveyed(path: Path) -> UrdfSurvey:
     return survey(load_description(str(path)))
+
+
+def _facet(normal: str, *corners: str) -> str:
+    loop = "".join(f"vertex {corner}\n" for corner in corners)
+    return f"facet normal {normal}\nouter loop\n{loop}endloop\nendfacet\n"
+
+
+_O, _X, _Y, _Z = "0 0 0", "0.03 0 0", "0 0.03 0", "0 0 0.1"
+TETRAHEDRON = (
+    f"solid a\n{_facet('0 0 -1', _O, _Y, _X)}{_facet('0 -1 0', _O, _X, _Z)}"
+    f"{_facet('-1 0 0', _O, _Z, _Y)}{_facet('1 1 1', _X, _Y, _Z)}endsolid a\n"
+)

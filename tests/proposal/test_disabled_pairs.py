@@ -1,6 +1,5 @@
 """Pairs that SRDF and MJCF rule out become ignored pairs of the config, counted and told."""
 
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -10,16 +9,13 @@ from excite_cli.errors import RobotError
 from excite_cli.geometry.reasons import Why
 from excite_cli.proposal.propose import Proposal, Request, propose
 from excite_cli.summary.pairs import kept_apart, pairs_data, unjudged
-from tests.proposal.robots import GOOD, joint, link, written
+from tests.proposal.robots import serial
 
 CHAIN = ("base", "upper", "lower", "hand")
 
 
 def arm(folder: Path) -> Path:
-    parts = [link("base")]
-    for above, below in pairwise(CHAIN):
-        parts += [joint(f"{below}_joint", above, below, GOOD), link(below)]
-    return written(folder, *parts)
+    return serial(folder, "base upper_joint upper lower_joint lower hand_joint hand")
 
 
 def srdf(folder: Path, *disabled: tuple[str, str, str], name: str = "robot") -> Path:
@@ -64,9 +60,7 @@ def test_pairs_that_never_meet_are_kept_apart_all_the_same(tmp_path: Path) -> No
     proposal = propose(Request("robot.urdf", tmp_path))
     assert ignored(proposal) == (("base", "lower"),)
     assert any("1 pairs that robot.srdf disables as never in" in note for note in proposal.notes)
-
-
-def test_links_that_are_not_here_are_told(tmp_path: Path) -> None:
+    # Links that are not here are told.
     arm(tmp_path)
     srdf(tmp_path, ("base", "gripper", "User"))
     proposal = propose(Request("robot.urdf", tmp_path))

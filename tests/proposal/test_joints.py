@@ -9,7 +9,7 @@ from excite_cli.proposal.joints import Choice, choose_joints
 from excite_cli.proposal.propose import Request, propose
 from excite_cli.robot.description import EXAMPLE_PREFIX, load_description
 from excite_cli.robot.urdf_joints import survey
-from tests.proposal.robots import GOOD, joint, link, surveyed, written
+from tests.proposal.robots import GOOD, joint, link, serial, surveyed, written
 
 TINY = 'lower="-0.0005" upper="0.001" velocity="1" effort="10"'
 
@@ -38,12 +38,10 @@ def test_arms_legs_and_hands_alone_are_chosen(robot: str, count: int, word: str)
     assert word in " ".join(name for names in choice.left_out.values() for name in names)
 
 
-def test_a_wrist_named_after_the_gripper_moves() -> None:
+def test_a_wrist_named_after_the_gripper_moves_and_rotors_do_not() -> None:
     names = [joint.name for joint in chosen("alex_nub_hands").chosen]
     assert "LeftGripperYaw" in names
-
-
-def test_only_rotors_is_a_robot_without_anything_to_move() -> None:
+    # Only rotors is a robot without anything to move.
     with pytest.raises(RobotError, match=r"iris has no arm, leg or hand to move, only rotors: "):
         chosen("iris")
 
@@ -51,20 +49,19 @@ def test_only_rotors_is_a_robot_without_anything_to_move() -> None:
 def test_what_is_asked_for_is_moved() -> None:
     choice = chosen("panda", ("panda_finger_joint1", "panda_joint2"))
     assert [joint.name for joint in choice.chosen] == ["panda_joint2", "panda_finger_joint1"]
-
-
-def test_a_joint_that_mimics_cannot_be_asked_for() -> None:
+    # A joint that mimics cannot be asked for.
     words = r"'panda_finger_joint2' mimics 'panda_finger_joint1' and moves with it\. Leave it out"
     with pytest.raises(ConfigError, match=words):
         chosen("panda", ("panda_finger_joint2",))
-
-
-def test_a_joint_that_mimics_does_as_its_driver_does() -> None:
+    # A joint that mimics does as its driver does.
     choice = chosen("panda", ("panda_finger_joint1",))
     assert choice.followers == {"panda_finger_joint1": ("panda_finger_joint2",)}
     assert "moved with panda_finger_joint1: panda_finger_joint2" in choice.in_words()
     assert "panda_finger_joint2" not in choice.left_out["not requested"]
     assert "panda_finger_joint2" in chosen("panda").left_out["fingers and grippers"]
+    # An unknown joint is told with the nearest.
+    with pytest.raises(ConfigError, match=r"no joint 'elbow'\. Did you mean 'elbow_joint'\?"):
+        chosen("ur10", ("elbow",))
 
 
 WHY = {
@@ -82,33 +79,34 @@ def test_joints_that_should_not_move_are_left_out_with_the_reason(
 ) -> None:
     why, given = WHY[name]
     end = given.get("child", "end")
-    path = written(
-        tmp_path,
-        link("base"),
-        joint("shoulder", "base", "upper", GOOD),
-        link("upper"),
-        joint(name, "upper", end, given.get("limit", GOOD), given.get("kind", "revolute")),
-        link(end, mass=0.01),
-    )
+    limit, kind = given.get("limit", GOOD), given.get("kind", "revolute")
+    own = {name: joint(name, "upper", end, limit, kind), end: link(end, mass=0.01)}
+    path = serial(tmp_path, f"base shoulder upper {name} {end}", **own)
     choice = choose_joints(surveyed(path).joints, "robot")
     assert choice.left_out == {why: (name,)}
     assert [each.name for each in choice.chosen] == ["shoulder"]
 
 
-def test_the_same_joints_move_if_asked_for_or_where_they_carry_the_robot(tmp_path: Path) -> None:
-    path = written(
+def test_joints_of_a_mobile_base_stay(tmp_path: Path) -> None:
+    path = serial(
         tmp_path,
-        link("base"),
-        joint("eye_of_the_crane", "base", "upper", GOOD),
-        link("upper"),
-        joint("bellows", "upper", "end", GOOD),
-        link("end", mass=0.01),
+        "world drive body arm tip",
+        world='<link name="world"/>',
+        drive=joint("drive", "world", "body", kind="planar"),
     )
+    choice = choose_joints(surveyed(path).joints, "robot")
+    assert [joint.name for joint in choice.chosen] == ["arm"]
+    assert choice.left_out == {"joints of the base": ("drive",)}
+    # A robot without joints says so.
+    with pytest.raises(RobotError, match="robot has no movable joint"):
+        choose_joints(surveyed(written(tmp_path, link("base"))).joints, "robot")
+    # The same joints move if asked for or where they carry the robot.
+    names = "base eye_of_the_crane upper bellows end"
+    path = serial(tmp_path, names, end=link("end", mass=0.01))
     joints = surveyed(path).joints
     assert [each.name for each in choose_joints(joints, "robot").chosen] == ["eye_of_the_crane"]
-    assert [each.name for each in choose_joints(joints, "robot", ("bellows",)).chosen] == [
-        "bellows"
-    ]
+    asked = choose_joints(joints, "robot", ("bellows",)).chosen
+    assert [each.name for each in asked] == ["bellows"]
 
 
 @pytest.mark.parametrize(
@@ -120,19 +118,9 @@ def test_the_same_joints_move_if_asked_for_or_where_they_carry_the_robot(tmp_pat
     ],
 )
 def test_joints_of_a_closed_loop_stay_where_they_are(closing: str, tmp_path: Path) -> None:
-    path = written(
-        tmp_path,
-        link("base"),
-        joint("shoulder", "base", "upper", GOOD),
-        link("upper"),
-        joint("motor", "upper", "crank", GOOD),
-        link("crank"),
-        joint("knee", "upper", "shin", GOOD),
-        link("shin"),
-        joint("pin", "shin", "rod", GOOD),
-        link("rod"),
-        closing,
-    )
+    shin = joint("knee", "upper", "shin", GOOD), link("shin")
+    rod = joint("pin", "shin", "rod", GOOD), link("rod")
+    path = serial(tmp_path, "base shoulder upper motor crank", *shin, *rod, closing)
     choice = choose_joints(surveyed(path).joints, "robot")
     assert choice.left_out == {
         "joints of closed loops, which the model cuts": ("motor", "knee", "pin")
@@ -144,27 +132,3 @@ def test_joints_of_a_closed_loop_stay_where_they_are(closing: str, tmp_path: Pat
     assert "<mimic>" in told
     text = propose(Request("robot.urdf", tmp_path)).text
     assert "not moved, joints of closed loops, which the model cuts: motor, knee, pin" in text
-
-
-def test_an_unknown_joint_is_told_with_the_nearest() -> None:
-    with pytest.raises(ConfigError, match=r"no joint 'elbow'\. Did you mean 'elbow_joint'\?"):
-        chosen("ur10", ("elbow",))
-
-
-def test_joints_of_a_mobile_base_stay(tmp_path: Path) -> None:
-    path = written(
-        tmp_path,
-        '<link name="world"/>',
-        joint("drive", "world", "body", kind="planar"),
-        link("body", 20),
-        joint("arm", "body", "tip", GOOD),
-        link("tip"),
-    )
-    choice = choose_joints(surveyed(path).joints, "robot")
-    assert [joint.name for joint in choice.chosen] == ["arm"]
-    assert choice.left_out == {"joints of the base": ("drive",)}
-
-
-def test_a_robot_without_joints_says_so(tmp_path: Path) -> None:
-    with pytest.raises(RobotError, match="robot has no movable joint"):
-        choose_joints(surveyed(written(tmp_path, link("base"))).joints, "robot")

@@ -18,6 +18,8 @@ def test_sensible_limits_are_left_alone(tmp_path: Path) -> None:
     plan = planned(tmp_path, GOOD)
     assert (plan.lower, plan.upper, plan.velocity, plan.effort) == (-2, 2, 3, 50)
     assert plan.notes == {}
+    slow = planned(tmp_path, 'lower="-1" upper="1" velocity="0.5" effort="9"')
+    assert slow.acceleration == 2.5
 
 
 @pytest.mark.parametrize("velocity", ["0", "100", "1e4"])
@@ -41,6 +43,9 @@ def test_a_range_that_is_none_is_replaced(tmp_path: Path, bounds: str) -> None:
     plan = planned(tmp_path, f'{bounds} velocity="3" effort="50"')
     assert (plan.lower, plan.upper) == (-3.1, 3.1)
     assert "±3.1 rad assumed" in plan.notes["position"]
+    missing = planned(tmp_path, "")
+    assert set(missing.notes) == {"position", "velocity"}
+    assert "none" in missing.notes["velocity"]
 
 
 @pytest.mark.parametrize(
@@ -60,12 +65,6 @@ def test_a_plan_stays_within_what_is_given(
     assert (plan.lower, plan.upper) == pytest.approx(wanted)
 
 
-def test_a_missing_limit_element_is_no_error(tmp_path: Path) -> None:
-    plan = planned(tmp_path, "")
-    assert set(plan.notes) == {"position", "velocity"}
-    assert "none" in plan.notes["velocity"]
-
-
 def test_a_joint_of_the_other_side_lends_its_limits(tmp_path: Path) -> None:
     path = written(
         tmp_path,
@@ -78,13 +77,7 @@ def test_a_joint_of_the_other_side_lends_its_limits(tmp_path: Path) -> None:
     right = plan_limits(surveyed(path).joints)[1]
     assert (right.velocity, right.effort) == (2, 30)
     assert right.notes["velocity"].endswith("as left_arm")
-
-
-def test_slow_joints_accelerate_gently(tmp_path: Path) -> None:
-    assert planned(tmp_path, 'lower="-1" upper="1" velocity="0.5" effort="9"').acceleration == 2.5
-
-
-def test_the_slowest_joint_sets_the_pace(tmp_path: Path) -> None:
+    # The slowest joint sets the pace.
     slow = 'lower="-3" upper="3" velocity="0.4" effort="50"'
     quick = choose_pace(plan_limits(surveyed(arm(tmp_path)).joints))
     pace = choose_pace(plan_limits(surveyed(arm(tmp_path, GOOD, slow)).joints))

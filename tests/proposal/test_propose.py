@@ -15,7 +15,7 @@ from excite_cli.robot.allowed_files import OutsideError
 from excite_cli.robot.description import EXAMPLE_PREFIX, load_description
 from excite_cli.robot.srdf import reference_posture, srdf_near
 from excite_cli.robot.urdf_joints import survey
-from tests.proposal.robots import GOOD, arm, joint, link, written
+from tests.proposal.robots import GOOD, TETRAHEDRON, arm, joint, link, serial, written
 from tests.summary.two_arms import two_arms
 
 BOTTOM = 'lower="0" upper="2.5" velocity="3" effort="50"'
@@ -27,17 +27,13 @@ def test_the_posture_is_clear_as_written(tmp_path: Path) -> None:
     problem = build_problem(parse_spec(proposal.text), tmp_path)
     assert clear_posture(MotionTask(problem), 1).as_configured
     assert proposal.joints == ("shoulder", "elbow")
-
-
-def test_what_was_assumed_stands_beside_the_key(tmp_path: Path) -> None:
+    # What was assumed stands beside the key.
     arm(tmp_path, 'lower="-2" upper="2" velocity="0" effort="0"')
     text = propose(Request("robot.urdf", tmp_path)).text
     line = next(line for line in text.splitlines() if "velocity: 3.1" in line)
     assert "the URDF gives 0 rad/s; 3.1 rad/s assumed" in line
-
-
-def test_a_torque_that_does_not_hold_the_arm_is_given_up(tmp_path: Path) -> None:
-    """Horizontal whatever the posture, an arm of 2 kg needs more than 0.1 N·m."""
+    # A torque that does not hold the arm is given up. Horizontal whatever the posture, an arm of 2
+    # kg needs more than 0.1 N·m.
     weak = 'lower="1.2" upper="1.9" velocity="3" effort="0.1"'
     arm(tmp_path, weak)
     proposal = propose(Request("robot.urdf", tmp_path))
@@ -50,31 +46,12 @@ def test_the_distance_kept_yields_where_links_are_close(tmp_path: Path) -> None:
         "</collision>"
     )
     tight = 'lower="-0.05" upper="0.05" velocity="3" effort="50"'
-    written(
-        tmp_path,
-        link("base", shape=""),
-        joint("a", "base", "one", tight),
-        link("one", shape=near.format(x=0)),
-        joint("b", "base", "two", tight),
-        link("two", shape=near.format(x=0.079)),
-    )
+    one, two = (link(name, shape=near.format(x=x)) for name, x in (("one", 0), ("two", 0.079)))
+    joints = joint("a", "base", "one", tight), joint("b", "base", "two", tight)
+    written(tmp_path, link("base", shape=""), one, two, *joints)
     problem = propose(Request("robot.urdf", tmp_path)).settled.problem
     assert problem.spec.constraints.self_collision is not None
     assert 0 < problem.spec.constraints.self_collision.margin < 0.01
-
-
-def test_without_collision_geometry_distances_are_not_asked_for(tmp_path: Path) -> None:
-    written(
-        tmp_path,
-        link("base", shape=""),
-        joint("shoulder", "base", "upper", GOOD),
-        link("upper", shape=""),
-        joint("elbow", "upper", "lower", GOOD),
-        link("lower", shape=""),
-    )
-    proposal = propose(Request("robot.urdf", tmp_path))
-    assert proposal.settled.problem.spec.constraints.self_collision is None
-    assert any("no collision geometry" in note for note in proposal.notes)
 
 
 def test_without_inertias_those_of_the_shapes_are_assumed(tmp_path: Path) -> None:
@@ -85,15 +62,19 @@ def test_without_inertias_those_of_the_shapes_are_assumed(tmp_path: Path) -> Non
     box = 1000.0 * 0.05 * 0.05 * 0.16
     masses = [inertia.mass for inertia in proposal.settled.problem.robot.model.inertias[1:]]
     assert masses == pytest.approx([box, box])
-
-
-def test_without_inertias_and_shapes_one_sentence_says_so(tmp_path: Path) -> None:
+    # Without inertias and shapes one sentence says so.
     written(tmp_path, link("base", -1, ""), joint("j", "base", "l", GOOD), link("l", -1, ""))
     with pytest.raises(RobotError, match=r"^robot\.urdf has no <inertial> at all, and no shapes"):
         propose(Request("robot.urdf", tmp_path))
     written(tmp_path, link("base", 0, ""), joint("j", "base", "l", GOOD), link("l", 0, ""))
     with pytest.raises(RobotError, match=r"^robot\.urdf has no mass: every <mass> is 0"):
         propose(Request("robot.urdf", tmp_path))
+    # Without collision geometry distances are not asked for.
+    bare = {name: link(name, shape="") for name in ("base", "upper", "lower")}
+    serial(tmp_path, "base shoulder upper elbow lower", **bare)
+    proposal = propose(Request("robot.urdf", tmp_path))
+    assert proposal.settled.problem.spec.constraints.self_collision is None
+    assert any("no collision geometry" in note for note in proposal.notes)
 
 
 def test_packages_are_found_above_the_urdf(tmp_path: Path) -> None:
@@ -106,14 +87,8 @@ def test_packages_are_found_above_the_urdf(tmp_path: Path) -> None:
         '<collision><origin xyz="0 0 0.1"/><geometry>'
         '<mesh filename="package://arm_description/meshes/arm.stl"/></geometry></collision>'
     )
-    written(
-        folder,
-        link("base", shape=""),
-        joint("shoulder", "base", "upper", GOOD),
-        link("upper", shape=shape),
-        joint("elbow", "upper", "lower", GOOD),
-        link("lower", shape=shape),
-    )
+    own = {name: link(name, shape=shape) for name in ("upper", "lower")}
+    serial(folder, "base shoulder upper elbow lower", base=link("base", shape=""), **own)
     with pytest.raises(OutsideError, match="the package 'arm_description' in"):
         propose(Request("urdf/robot.urdf", tmp_path / "ws"))
     request = Request("urdf/robot.urdf", tmp_path / "ws", allow=lambda needed: True)
@@ -122,52 +97,17 @@ def test_packages_are_found_above_the_urdf(tmp_path: Path) -> None:
     assert any("read the package 'arm_description' in" in note for note in proposal.notes)
 
 
-def test_reference_postures_are_read() -> None:
+def test_limbs_and_reference_posture_of_a_humanoid() -> None:
     description = load_description(EXAMPLE_PREFIX + "talos")
     near = srdf_near(description.path)
     file, state, values = reference_posture(near, description.path, ("leg_left_4_joint",))
     assert (file, state) == ("talos.srdf", "half_sitting")
     assert values["leg_left_4_joint"] == pytest.approx(0.859395)
-
-
-def test_limbs_of_a_humanoid() -> None:
+    # Limbs of a humanoid.
     joints = survey(load_description(EXAMPLE_PREFIX + "talos")).joints
     groups = limbs([joint for joint in joints if joint.mimics is None])
     assert len(groups["leg_left"]) == 6
     assert set(groups["torso"]) == {"torso_1_joint", "torso_2_joint"}
-
-
-TETRAHEDRON = """solid a
-facet normal 0 0 -1
-outer loop
-vertex 0 0 0
-vertex 0 0.03 0
-vertex 0.03 0 0
-endloop
-endfacet
-facet normal 0 -1 0
-outer loop
-vertex 0 0 0
-vertex 0.03 0 0
-vertex 0 0 0.1
-endloop
-endfacet
-facet normal -1 0 0
-outer loop
-vertex 0 0 0
-vertex 0 0 0.1
-vertex 0 0.03 0
-endloop
-endfacet
-facet normal 1 1 1
-outer loop
-vertex 0.03 0 0
-vertex 0 0.03 0
-vertex 0 0 0.1
-endloop
-endfacet
-endsolid a
-"""
 
 
 def test_visual_shapes_stand_for_collision_shapes_that_are_missing(tmp_path: Path) -> None:
@@ -191,16 +131,15 @@ def test_meshes_that_are_never_far_enough_apart_end_in_no_refusal(tmp_path: Path
         '<collision><origin xyz="0 0 {at}" rpy="0.001 0 0"/><geometry>'
         '<cylinder radius="0.2" length="0.01"/></geometry></collision>'
     )
-    turning = joint("second", "middle", "above", GOOD).replace('xyz="0 1 0"', 'xyz="0 0 1"')
-    path = written(
+    second = joint("second", "middle", "above", GOOD).replace('xyz="0 1 0"', 'xyz="0 0 1"')
+    path = serial(
         tmp_path,
-        link("base", shape=disc.format(at=0.0)),
-        joint("first", "base", "middle", GOOD).replace('xyz="0 1 0"', 'xyz="0 0 1"'),
-        link("middle", shape=""),
-        turning.replace('xyz="0 0 0.25"', 'xyz="0 0 0"'),
-        link("above", shape=disc.format(at=0.0121 - 0.25)),
-        joint("third", "above", "hand", GOOD),
-        link("hand"),
+        "base first middle second above third hand",
+        base=link("base", shape=disc.format(at=0.0)),
+        first=joint("first", "base", "middle", GOOD).replace('xyz="0 1 0"', 'xyz="0 0 1"'),
+        middle=link("middle", shape=""),
+        second=second.replace('xyz="0 0 0.25"', 'xyz="0 0 0"'),
+        above=link("above", shape=disc.format(at=0.0121 - 0.25)),
     )
     found = propose(Request(str(path), tmp_path))
     assert found.settled.tree["constraints"]["self_collision"]["ignore"] == [["base", "above"]]
@@ -216,10 +155,8 @@ def test_what_is_given_stands_in_place_of_what_is_proposed(tmp_path: Path) -> No
     assert spec.constraints.self_collision is None
     assert spec.robot.posture["elbow"] == 0.4
     assert "motions: 5  # as given with --set" in proposal.text
-
-
-def test_what_is_given_yields_only_where_nothing_else_would_do(tmp_path: Path) -> None:
-    """A margin wider than the links are apart."""
+    # What is given yields only where nothing else would do. A margin wider than the links are
+    # apart.
     arm(tmp_path)
     wide = ("constraints.self_collision.margin=0.9",)
     proposal = propose(Request("robot.urdf", tmp_path, overrides=wide))
@@ -254,34 +191,17 @@ def test_one_base_parameter_has_another_criterion(tmp_path: Path) -> None:
     assert "of one base parameter is always 1" in proposal.text
 
 
-def test_slides_and_turns_of_the_whole_robot_stay(tmp_path: Path) -> None:
+def test_joints_of_the_base_and_joints_that_move_no_mass_stay(tmp_path: Path) -> None:
     """As MuJoCo's planar robots have them: three joints between the world and the trunk."""
-    bare = [f'<link name="{name}"/>' for name in ("world", "a", "b")]
-    written(
-        tmp_path,
-        *bare,
-        joint("rootz", "world", "a", GOOD, "prismatic"),
-        joint("rootx", "a", "b", GOOD, "prismatic"),
-        joint("rooty", "b", "trunk", GOOD),
-        link("trunk"),
-        joint("hip", "trunk", "leg", GOOD),
-        link("leg"),
-    )
+    own = {name: f'<link name="{name}"/>' for name in ("world", "a", "b")}
+    own["rootz"] = joint("rootz", "world", "a", GOOD, "prismatic")
+    own["rootx"] = joint("rootx", "a", "b", GOOD, "prismatic")
+    serial(tmp_path, "world rootz a rootx b rooty trunk hip leg", **own)
     proposal = propose(Request("robot.urdf", tmp_path))
     assert proposal.joints == ("hip",)
     assert proposal.left_out["joints of the base"] == ("rootz", "rootx", "rooty")
-
-
-def test_a_joint_that_moves_no_mass_stays(tmp_path: Path) -> None:
-    """It shows no parameter, and no simulator plays it."""
-    written(
-        tmp_path,
-        link("base"),
-        joint("shoulder", "base", "upper", GOOD),
-        link("upper"),
-        joint("flange", "upper", "tip", GOOD),
-        '<link name="tip"/>',
-    )
+    # A joint that moves no mass stays. It shows no parameter, and no simulator plays it.
+    serial(tmp_path, "base shoulder upper flange tip", tip='<link name="tip"/>')
     proposal = propose(Request("robot.urdf", tmp_path))
     assert proposal.joints == ("shoulder",)
     assert proposal.left_out["joints that move no mass"] == ("flange",)

@@ -9,8 +9,7 @@ from excite_cli.errors import ConfigError, RobotError
 from excite_cli.excitation.problem import build_problem
 from excite_cli.proposal.propose import Request, propose
 from excite_cli.summary.pairs import kept_apart, not_guarded, pairs_data, pairs_in_words
-from tests.proposal.robots import BOX, GOOD, joint, link, written
-from tests.proposal.test_propose import TETRAHEDRON
+from tests.proposal.robots import BOX, GOOD, TETRAHEDRON, joint, link, serial, written
 
 # Packages are looked for beside the folders above a robot, where other tests have theirs.
 FINGERS = "package://hand_description/meshes/{}.stl"
@@ -22,17 +21,13 @@ def shape(name: str, kind: str = "collision") -> str:
 
 def with_gripper(folder: Path, hand: str, second: str = GOOD) -> Path:
     """An arm of two boxes with a gripper of two links, of which `hand` is the first one's shape."""
-    return written(
+    return serial(
         folder,
-        link("base"),
-        joint("shoulder", "base", "upper", GOOD),
-        link("upper"),
-        joint("elbow", "upper", "lower", second),
-        link("lower"),
-        joint("mount", "lower", "palm", kind="fixed"),
-        link("palm", shape=hand),
-        joint("wrist", "palm", "finger", GOOD),
-        link("finger", shape=shape(FINGERS.format("finger"))),
+        "base shoulder upper elbow lower mount palm wrist finger",
+        elbow=joint("elbow", "upper", "lower", second),
+        mount=joint("mount", "lower", "palm", kind="fixed"),
+        palm=link("palm", shape=hand),
+        finger=link("finger", shape=shape(FINGERS.format("finger"))),
     )
 
 
@@ -75,9 +70,10 @@ def test_once_the_package_is_there_the_links_are_guarded(tmp_path: Path) -> None
 
 def test_visual_shapes_stand_for_collision_meshes_that_are_missing(tmp_path: Path) -> None:
     seen = BOX.replace("collision", "visual")
-    with_gripper(tmp_path, shape(FINGERS.format("palm")) + seen)
-    problem = propose(Request("robot.urdf", tmp_path)).settled.problem
-    assert pairs_data(problem)["links_without_shapes"] == ["palm", "finger"]
+    for other in (BOX, seen):  # a link that misses one of two meshes keeps neither
+        with_gripper(tmp_path, shape(FINGERS.format("palm")) + other)
+        problem = propose(Request("robot.urdf", tmp_path)).settled.problem
+        assert pairs_data(problem)["links_without_shapes"] == ["palm", "finger"]
     path = tmp_path / "robot.urdf"
     finger = link("finger", shape=shape(FINGERS.format("finger")))
     path.write_text(path.read_text().replace(finger, finger.replace("</link>", f"{seen}</link>")))
@@ -95,15 +91,7 @@ def test_a_damaged_mesh_costs_its_link_only(tmp_path: Path) -> None:
     proposal = propose(Request("robot.urdf", tmp_path))
     assert any("palm.stl cannot be loaded" in note for note in proposal.notes)
     assert pairs_data(proposal.settled.problem)["links_without_shapes"] == ["palm"]
-
-
-def test_a_link_that_misses_one_of_two_meshes_keeps_neither(tmp_path: Path) -> None:
-    with_gripper(tmp_path, shape(FINGERS.format("palm")) + BOX)
-    problem = propose(Request("robot.urdf", tmp_path)).settled.problem
-    assert "palm" in pairs_data(problem)["links_without_shapes"]
-
-
-def test_without_any_mesh_the_note_names_the_package(tmp_path: Path) -> None:
+    # Without any mesh the note names the package.
     mesh = shape(FINGERS.format("palm"))
     written(tmp_path, link("base", shape=""), joint("j", "base", "l", GOOD), link("l", shape=mesh))
     notes = propose(Request("robot.urdf", tmp_path)).notes

@@ -44,9 +44,7 @@ def test_years_without_a_change_are_left_alone() -> None:
     rng = np.random.default_rng(2)
     false = sum(bool(changes_of(year(rng, swing=-0.05)).significant) for _ in range(200))
     assert false <= 10  # 5 % of the years
-
-
-def test_deviations_that_are_too_small_raise_no_alarm() -> None:
+    # Deviations that are too small raise no alarm.
     rng = np.random.default_rng(3)
 
     def narrow(day: Snapshot) -> Snapshot:
@@ -69,9 +67,7 @@ def test_two_days_are_a_difference() -> None:
     assert change.name == "a"
     assert (change.before, change.after) == pytest.approx((1.0, 1.2))
     assert change.since == "new"
-
-
-def test_an_effect_that_appears_was_zero_and_a_parameter_that_is_not_known_is_not() -> None:
+    # An effect that appears was zero and a parameter that is not known is not.
     days = [Snapshot(f"d{k}", {"x": Known(1.0, 0.01)}) for k in range(4)]
     days += [
         Snapshot(

@@ -35,9 +35,7 @@ def test_the_joint_and_the_run_are_seen() -> None:
     assert (found.first, found.joints, found.runs) == (16, ("c",), (16, 17, 18, 19))
     assert found.times == pytest.approx(1.5, rel=0.1)
     assert found.usual["c"] == pytest.approx(1.0, abs=0.05)
-
-
-def test_alarms_before_do_not_count_and_alarms_after_do() -> None:
+    # Alarms before do not count and alarms after do.
     given = runs(1.6, 16)
     given[3] = run(3, np.full(6, 9.0), alarm=True)
     given[18:] = [replace(each, left=("c",)) for each in given[18:]]
@@ -47,9 +45,7 @@ def test_alarms_before_do_not_count_and_alarms_after_do() -> None:
     assert (
         shift_of([*given[:16], *(replace(each, left=("c",)) for each in given[16:])], NAMES) is None
     )
-
-
-def test_the_time_of_recording_is_the_order() -> None:
+    # The time of recording is the order.
     given = runs(1.5, 16)
     stamped = [replace(each, epoch=float(k)) for k, each in enumerate(given)]
     mixed = [stamped[k] for k in np.random.default_rng(3).permutation(20)]
