@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.whole_plant import WholePlant
 from excite_cli.config.constraints_spec import (
     ConstraintsSpec,
     ContactSpec,
@@ -35,6 +34,7 @@ from excite_cli.robot.model import Robot
 from tests.constraints.test_gradients import _check as check_gradients
 from tests.dynamics.test_uncertain_inertias import SPEC, knowledge
 from tests.robot.random_robots import random_robot
+from tests.whole_plant import WholePlant
 
 CORNERS = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))
 ALL = ConstraintsSpec(

@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.whole_plant import WholePlant
 from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.regressor import InverseDynamics, standard_parameters
 from excite_cli.dynamics.row_adjoint import RowAdjoint
 from excite_cli.dynamics.whole_robot import GroundWrench, drawn_states, whole_parameters
 from excite_cli.robot.model import Robot
 from tests.robot.random_robots import random_robot
+from tests.whole_plant import WholePlant
 
 
 @settings(max_examples=20, derandomize=True, deadline=None)
