@@ -15,7 +15,7 @@ from pathlib import Path
 from threading import Timer
 from typing import Any
 
-from benchmarks.battery.scoring import Answer, Found, Name, Plant, score
+from benchmarks.battery.scoring import Name, Truth, answer_of_json, plant_of_record, score
 from benchmarks.robots.sources import Source
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -125,30 +125,11 @@ def _travel(source: Source, steps: _Steps, seed: int) -> None:
 
 def judged(answer: dict[str, Any], plant: dict[str, Any]) -> Record:
     """What was named, and whether that is the planted effect alone."""
-    there = Plant(
-        Name(plant["kind"], tuple(plant["joints"])),
-        tuple(plant["touched"]),
-        tuple(Name(kind, tuple(joints)) for kind, joints in plant["companions"]),
-    )
-    close = {_key(each) for each in answer["approximations"]}
-    found = [
-        Found(_name(each), tuple(map(_name, each["alias_set"])), _key(each) in close)
-        for each in answer["effects"]
-    ]
-    told = Answer(
-        tuple(found),
-        tuple(map(_name, answer["absorbed"])),
-        tuple(each["joint"] for each in answer["unexplained"]),
-        tuple(
-            joint
-            for finding in answer["findings"]
-            if finding["kind"] == "saturated"
-            for joint in finding["joints"]
-        ),
-    )
-    result = score([there], told, plant["friction"], plant["moved"])
+    told = answer_of_json(answer)
+    friction = "declared" if plant["friction"] else "none"
+    result = score(Truth([plant_of_record(plant)], plant["moved"], friction), told)
     return {
-        "named": [f"{each.name.kind} of {', '.join(each.name.joints)}" for each in found],
+        "named": [_words(each.called.name) for each in told.named],
         "verdicts": list(result.names),
         "right": result.right,
         "alone": result.right and _is_alone(result.names),
@@ -166,12 +147,8 @@ def _is_alone(verdicts: tuple[str, ...]) -> bool:
     return once and all(name in _GOOD for name in verdicts)
 
 
-def _key(each: dict[str, Any]) -> tuple[Any, ...]:
-    return each["kind"], tuple(each["joints"]), tuple(each["runs"])
-
-
-def _name(each: dict[str, Any]) -> Name:
-    return Name(each["kind"], tuple(each["joints"]))
+def _words(name: Name) -> str:
+    return f"{name.kind} of {', '.join(name.joints)}"
 
 
 def _ignored(config: Path) -> int:

@@ -19,7 +19,7 @@ from tests.cli.program import SMOKE
 
 pytest.importorskip("mujoco")
 
-from benchmarks.battery.history import DahlBySpeed, MaxwellSlip
+from benchmarks.battery.outside import DahlBySpeed, MaxwellSlip
 from excite_cli.simulation.ground_truth import Planted, plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
