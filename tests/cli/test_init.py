@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.trust.fuzz_meshes import VALID
+from benchmarks.trust.robot_files import VALID
 from excite_cli.config.load import load_spec
 from tests.cli.program import BRIEF, Program
 from tests.proposal.robots import GOOD, arm, joint, link, written
