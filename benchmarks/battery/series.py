@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.battery.motions import CONFIGS, Arm
+from benchmarks.battery.motions import CONFIGS, HARMONICS, Arm, waves
 from excite_cli.config.load import load_spec
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import find_base_parameters
@@ -80,7 +80,6 @@ def joint_limits(robot: Robot) -> tuple[NDArray, NDArray, NDArray]:
     return lower, upper, np.minimum(robot.limits.velocity, 3.0)
 
 
-_HARMONICS = 5
 _ACCELERATION = 8.0  # rad/s²
 _DRAWS = 6
 _GRID = 60
@@ -99,8 +98,9 @@ def series(of: Arm, names: tuple[str, ...], rng: np.random.Generator) -> tuple[P
             again = found[rng.integers(len(found))]
             found.append(PlannedMotion(name, again.trajectory, again.coefficients))
             continue
-        trajectory = FourierTrajectory(_HARMONICS, 2 * np.pi / (seconds * rng.uniform(1.0, 1.2)))
-        drawn = [_waves(of, trajectory, rng) for _ in range(_DRAWS)]
+        trajectory = FourierTrajectory(HARMONICS, 2 * np.pi / (seconds * rng.uniform(1.0, 1.2)))
+        fastest = joint_limits(of.robot)[2]
+        drawn = [waves(of, trajectory, 300, fastest, _ACCELERATION, rng) for _ in range(_DRAWS)]
         best = min(drawn, key=lambda each: _condition(of, trajectory, each))
         found.append(PlannedMotion(name, trajectory, best))
     return tuple(found)
@@ -116,24 +116,6 @@ def _condition(of: Arm, trajectory: FourierTrajectory, coefficients: Array) -> f
     states = trajectory.basis(times).states(coefficients)
     y = Regressor(of.robot).evaluate(*states)[:, :, of.base.selection].reshape(-1, of.base.rank)
     return float(np.linalg.cond(y / np.maximum(np.linalg.norm(y, axis=0), 1e-12)))
-
-
-def _waves(of: Arm, trajectory: FourierTrajectory, rng: np.random.Generator) -> Array:
-    """Random series about a random centre, every joint scaled to its own limits."""
-    n = of.robot.n
-    lower, upper, fastest = joint_limits(of.robot)
-    falling = np.arange(1, _HARMONICS + 1) ** -rng.uniform(0.3, 1.3)
-    shape = np.vstack(
-        [rng.normal(size=(2 * _HARMONICS, n)) * np.tile(falling, 2)[:, None], np.zeros((1, n))]
-    )
-    q, v, a = trajectory.basis(np.arange(300) * trajectory.duration / 300).states(shape)
-    highest, lowest = q.max(axis=0), q.min(axis=0)
-    room = (upper - lower) / np.maximum(highest - lowest, 1e-12)
-    speed, push = fastest / np.abs(v).max(axis=0), _ACCELERATION / np.abs(a).max(axis=0)
-    scale = np.min([room, speed, push], axis=0) * rng.uniform(0.6, 0.9, n)
-    shape *= scale
-    shape[-1] = rng.uniform(lower - scale * lowest, upper - scale * highest)
-    return shape
 
 
 def _moves(of: Arm, rng: np.random.Generator) -> Chain:
