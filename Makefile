@@ -90,13 +90,10 @@ gallery: $(STAMP)        ## the same logs, a page with pictures for each robot (
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m docs.make_gallery
 
 battery: $(STAMP)        ## the diagnosis on MuJoCo robots with undeclared effects (about 20 minutes)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.diagnosis_battery --cases 130 --seed 5310
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.battery --cases 130 --seed 5310
 
-campaigns: $(STAMP)      ## runs that differ, short moves, faulty packets; many runs, orders, noises
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.campaign_battery --cases 208 --seed 5018
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.runs
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.orders
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.noises
+campaigns: $(STAMP)      ## runs that differ, short moves, faulty packets; coverage of intervals
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.battery --deck campaigns --cases 208 --seed 5018
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.coverage --seed 2
 
 # Development and CI use the pinned versions of requirements/ci.txt, checked by their hashes; the

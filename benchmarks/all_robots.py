@@ -16,7 +16,8 @@ import re
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from benchmarks.robots.journey import ROOT, travelled
+from benchmarks.program import ROOT
+from benchmarks.robots.journey import travelled
 from benchmarks.robots.page import page
 from benchmarks.robots.sources import Source, fetch, sources
 

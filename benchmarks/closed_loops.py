@@ -13,8 +13,6 @@ Every command is one that a user types. One file per robot, so that a run can be
 import argparse
 import json
 import os
-import subprocess
-import sys
 from dataclasses import dataclass, replace
 from datetime import date
 from math import ceil
@@ -25,7 +23,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
+from benchmarks import pages
 from benchmarks.battery.scoring import Name, same
+from benchmarks.program import ROOT, excite
 from excite_cli import motions_of, read_diagnosis
 from excite_cli.api.loading import load_problem
 from excite_cli.dynamics.regressor import InverseDynamics
@@ -34,8 +34,6 @@ from excite_cli.excitation.random_baseline import random_baseline
 from excite_cli.excitation.result import Result
 from excite_cli.store.result_file import read_result, write_result
 
-ROOT = Path(__file__).resolve().parents[1]
-_PROGRAM = "from excite_cli.cli.app import main; main()"
 _TEST_SEED = 4711
 _TEST_MOTIONS = 2
 _FIRST = 3  # motions that are planned at least
@@ -102,17 +100,7 @@ class Folder:
 
     def excite(self, *words: str, good: tuple[int, ...] = (0,)) -> Any:
         """What `--json` answers."""
-        run = subprocess.run(
-            [sys.executable, "-P", "-c", _PROGRAM, *words, "--json"],
-            cwd=self.place,
-            env={**os.environ, "PYTHONPATH": str(ROOT)},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        if run.returncode not in good:
-            raise RuntimeError(f"excite {' '.join(words)}\n{run.stderr[-2000:]}")
-        return json.loads(run.stdout) if run.stdout.strip() else {}
+        return excite(*words, "--json", folder=self.place, good=good).answer or {}
 
 
 def closed(loop: Loop, folder: Folder) -> Record:
@@ -242,38 +230,31 @@ def right(record: Record, named: list[list[Any]]) -> tuple[int, int]:
 
 def table(records: list[Record]) -> str:
     """Markdown: a row per robot and way."""
-    lines = [
-        "| robot | way | motions | seconds | effects named | wrong names | held-out error |",
-        "|---|---|---:|---:|---|---:|---:|",
-    ]
+    rows = []
     for record in records:
         for way, each in record["ways"].items():
             found, wrong = right(record, each["named"])
-            lines.append(
-                f"| {record['robot']} | {way} | {each['motions']} | {each['seconds']:.0f} "
-                f"| {found} of {len(record['planted'])} | {wrong} | {each['missed']:.2%} |"
-            )
-    return "\n".join(lines)
+            named = f"{found} of {len(record['planted'])}"
+            spent = (each["motions"], f"{each['seconds']:.0f}")
+            rows.append([record["robot"], way, *spent, named, wrong, f"{each['missed']:.2%}"])
+    heads = ("robot", "way", "motions:", "seconds:", "effects named", "wrong names:")
+    return pages.table([*heads, "held-out error:"], rows)
 
 
 def rounds(records: list[Record]) -> str:
     """Markdown: a row per round."""
-    lines = [
-        "| robot | round | pace | seconds | error before | error after | effects found |",
-        "|---|---:|---:|---:|---:|---:|---|",
-    ]
+    rows: list[list[object]] = []
     for record in records:
         for each in record["rounds"]:
             learned = each["learned"]
             seconds = sum(motion["seconds"] for motion in each["motions"])
             pace = min(motion["pace"] for motion in each["motions"])
-            lines.append(
-                f"| {record['robot']} | {each['number']} | {pace:.0%} | {seconds:.0f} "
-                f"| {learned['before']:.2%} | {learned['after']:.2%} "
-                f"| {', '.join(learned['effects'])} |"
-            )
-        lines.append(f"| {record['robot']} | ended | | | | | {record['reason']} |")
-    return "\n".join(lines)
+            errors = (f"{learned[when]:.2%}" for when in ("before", "after"))
+            told = (each["number"], f"{pace:.0%}", f"{seconds:.0f}", *errors)
+            rows.append([record["robot"], *told, ", ".join(learned["effects"])])
+        rows.append([record["robot"], "ended", "", "", "", "", record["reason"]])
+    heads = ("robot", "round:", "pace:", "seconds:", "error before:", "error after:")
+    return pages.table([*heads, "effects found"], rows)
 
 
 def main() -> None:

@@ -22,11 +22,12 @@ import numpy as np
 from scipy.signal import lfilter
 
 from benchmarks.battery.motions import arm, four_motions
-from benchmarks.known_payload import friction_of, payload_of
 from excite_cli.config.data_spec import EffectSpec, FilterSpec, IdentificationSpec
+from excite_cli.effects.catalogue import kind_named
 from excite_cli.identification.identify import identify
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.robot.model import Array
+from excite_cli.simulation.ground_truth import Planted, plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 
@@ -35,6 +36,7 @@ RATE, LEVEL, INERTIAS_OFF = 200.0, 0.02, 0.1  # Hz; share of a joint's torque; s
 INTERVAL, SETS, LOADED = 1.96, 8, "motion_2"
 COUNTS = 4096  # of a turn, by an encoder of 12 bits
 LOW = FilterSpec(position=3.0, parallel=1.5)  # Hz; the motions have 1 to 2
+FRICTION = ("viscous_friction", "coulomb_friction")
 NONE = FilterSpec(position="none", parallel="none")
 Made = Callable[[np.random.Generator, int, int], Array]
 
@@ -80,6 +82,22 @@ def noisy(data: Dataset, made: Made, coarse: bool, rng: np.random.Generator) -> 
     return replace(data, runs=tuple(runs))
 
 
+def friction_of(joints: int, rng: np.random.Generator) -> list[Planted]:
+    """Viscous and Coulomb friction of every joint."""
+    return [
+        plant(kind_named(kind), (j,), float(rng.uniform(0.5, 5.0)))
+        for kind in FRICTION
+        for j in range(joints)
+    ]
+
+
+def payload_of(joint: int, mass: float, centre: Array, run: str) -> Planted:
+    """A sphere on the joint's link in one run."""
+    others = dict(zip(("cx", "cy", "cz"), map(float, centre), strict=True))
+    one = plant(kind_named("payload"), (joint,), float(mass), others)
+    return replace(one, effect=replace(one.effect, runs=(run,)))
+
+
 def scores(
     name: str, number: int, seed: int, trials: int, noise: str, inertias: Any
 ) -> tuple[list[str], Array]:
@@ -97,7 +115,7 @@ def scores(
     played = simulate(of.robot, motions, settings, [*rubbing, body])
     on_last = (of.robot.joint_names[-1],)
     effects = (
-        *(EffectSpec(kind=kind) for kind in ("viscous_friction", "coulomb_friction")),
+        *(EffectSpec(kind=kind) for kind in FRICTION),
         EffectSpec(kind="payload", joints=on_last, runs=(LOADED,)),
     )
     made, wanted, coarse = NOISES[noise]

@@ -5,9 +5,7 @@ Run: python -m benchmarks.gradient
 
 from threadpoolctl import threadpool_limits
 
-from benchmarks.bare import BareCalls
-from benchmarks.problems import WITHOUT_GEOMETRY, motion, problem
-from benchmarks.timing import interleaved
+from benchmarks.problems import WITHOUT_GEOMETRY, BareCalls, interleaved, motion, problem
 from excite_cli.criteria.smooth_condition_number import SmoothConditionNumber
 from excite_cli.excitation.gradient_check import (
     block_gradient,

@@ -16,9 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from benchmarks.bare import BareCalls
-from benchmarks.problems import CONFIGS, motion, problem
-from benchmarks.timing import interleaved
+from benchmarks.problems import CONFIGS, BareCalls, interleaved, motion, problem
 from excite_cli.config.load import load_spec
 from excite_cli.excitation.base_motion import base_motion
 from excite_cli.excitation.problem import Problem

@@ -11,9 +11,6 @@ more are taken from the start again, with fresh noise of the torque).
 """
 
 import argparse
-import os
-import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -22,6 +19,7 @@ import h5py
 import numpy as np
 
 from benchmarks.battery.motions import CONFIGS, arm, pool, trajectory
+from benchmarks.program import excite
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.measurement.hdf5_writer import write_dataset
@@ -93,21 +91,14 @@ def _write(path: Path, run: Run) -> None:
     write_dataset(path, Dataset(arm(ROBOT).robot.joint_names, (run,)), {})
 
 
-def measured(command: str, paths: list[Path], workers: int) -> tuple[float, float, str]:
-    """Seconds, peak memory [MB] of the command's own process, and its last words."""
-    program = str(Path(sys.executable).with_name("excite"))
+def measured(command: str, paths: list[Path], workers: int) -> tuple[float, float]:
+    """Seconds, and peak memory [MB] of the command's own process."""
     with tempfile.TemporaryDirectory() as folder:
-        output = str(Path(folder) / "found.h5")
-        line = [program, command, str(CONFIGS / f"{ROBOT}.yaml"), *map(str, paths), "-o", output]
+        line = [command, CONFIGS / f"{ROBOT}.yaml", *paths, "-o", Path(folder) / "found.h5"]
         line += ["--quiet", *(["--workers", str(workers)] if workers > 1 else [])]
         began = time.perf_counter()
-        process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-        assert process.stdout is not None
-        words = process.stdout.read().decode()
-        _, status, usage = os.wait4(process.pid, 0)
-    if os.waitstatus_to_exitcode(status) not in (0, 1):
-        raise SystemExit(f"{command} ended with status {status}:\n{words}")
-    return time.perf_counter() - began, usage.ru_maxrss * 1024 / 1e6, words
+        found = excite(*line, good=(0, 1))
+    return time.perf_counter() - began, found.memory
 
 
 def main() -> None:
@@ -129,7 +120,7 @@ def main() -> None:
             print(f"{command:10} {'files':>6} {'samples':>9} {'seconds':>8} {'us/sample':>10} MB")
             for each in cases:
                 samples = sum(len(_read(path).t) for path in each)
-                seconds, memory, _ = measured(command, each, given.workers)
+                seconds, memory = measured(command, each, given.workers)
                 print(f"{'':10} {len(each):6} {samples:9} {seconds:8.1f} "
                       f"{1e6 * seconds / samples:10.1f} {memory:.0f}", flush=True)  # fmt: skip
 

@@ -9,23 +9,20 @@ values are those of the logs' authors. Four minutes of processor time.
 """
 
 import argparse
-import json
-import os
-import subprocess
-import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.marked_part import MarkedPart
+from benchmarks import pages
+from benchmarks.pages import MarkedPart, percent
+from benchmarks.program import excite
 from excite_cli.atomic import write_text_atomically
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION
 
 DATA = Path(__file__).parents[1] / "data"
 PART = MarkedPart("real robots", "benchmarks.real_robots")
 HEADS = ("log", "before", "after", "what was found")
-_PROGRAM = "from excite_cli.cli.app import main; main()"
 _CAD = ("--set", "identification.inertias=cad")
 _FRICTION = ("viscous_friction", "coulomb_friction", "asymmetric_friction")
 _USELESS = ("torso_lift_joint", "arm_5_joint", "arm_6_joint", "arm_7_joint")
@@ -89,7 +86,7 @@ def main() -> None:
         if not arguments.log or log.folder in arguments.log:
             answers = [diagnosed(log, options) for options in log.runs]
             rows.append(row(log, answers))
-            print(line(rows[-1]), flush=True)
+            print(" | ".join(rows[-1]), flush=True)
     if arguments.markdown is not None:
         page = arguments.markdown.read_text(encoding="utf-8")
         write_text_atomically(arguments.markdown, PART.replaced(page, table(rows)))
@@ -98,17 +95,10 @@ def main() -> None:
 def diagnosed(log: Log, options: Sequence[str]) -> Answer:
     """The answer of `excite diagnose`, by the program in a process of its own."""
     folder = DATA / log.folder
-    asked = ["diagnose", folder / f"{log.folder}.yaml", folder / log.file, *options]
-    run = subprocess.run(
-        [sys.executable, "-c", _PROGRAM, *map(str, asked), "--json", "--no-progress"],
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if run.returncode not in (0, 1):  # 1: the held-out error did not fall, which the table shows
-        raise SystemExit(f"{log.words}: {run.stderr}")
-    return Answer(json.loads(run.stdout))
+    asked = ("diagnose", folder / f"{log.folder}.yaml", folder / log.file, *options)
+    # 1: the held-out error did not fall, which the table shows
+    answer = excite(*asked, "--json", "--no-progress", good=(0, 1)).answer
+    return Answer(answer)
 
 
 def row(log: Log, answers: Sequence[Answer]) -> tuple[str, ...]:
@@ -242,18 +232,9 @@ def told(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
-def percent(value: float) -> str:
-    """`94 %`, `8.8 %`."""
-    return f"{100 * value:.0f} %" if value >= 0.0995 else f"{100 * value:.1f} %"
-
-
-def line(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
-
-
 def table(rows: Sequence[Sequence[str]]) -> str:
-    """The rows under their heads, in Markdown."""
-    return "\n".join(line(each) for each in [HEADS, ["---"] * len(HEADS), *rows])
+    """The rows under their heads."""
+    return pages.table(HEADS, rows)
 
 
 if __name__ == "__main__":

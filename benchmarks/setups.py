@@ -18,6 +18,8 @@ import os
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -73,6 +75,15 @@ class Outcome:
         return f"{good} {marks} {self.seconds:4.1f} s  {words}"
 
 
+@contextmanager
+def _file(data: Dataset) -> Iterator[Path]:
+    """The data in a file, as long as it is looked at."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "log.h5"
+        write_dataset(file, data, {})
+        yield file
+
+
 def _case(case: Case, robot: dict[str, object]) -> Case:
     tree = case.spec.model_dump(mode="json", exclude_unset=True)
     measured = tree.get("measurement", {})
@@ -105,9 +116,7 @@ def _set(case: Case, settings: object) -> Case:
 def _judged(
     label: str, case: Case, altered: Altered, usual: frozenset[str], sound: float
 ) -> Outcome:
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "log.h5"
-        write_dataset(file, altered.data, {})
+    with _file(altered.data) as file:
         began = time.process_time()
         try:
             found = inspect(_case(case, altered.robot), file, tell=lambda note: None)
@@ -138,9 +147,7 @@ def _judged(
 
 def _usual(case: Case, data: Dataset) -> tuple[frozenset[str], float]:
     """Rows that have a doubt in the log as it is, and the textbook's error."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "log.h5"
-        write_dataset(file, data, {})
+    with _file(data) as file:
         found = inspect(_case(case, {}), file, tell=lambda note: None)
         return frozenset(_doubted(found.results)), _error(_case(case, {}), file)
 
@@ -230,9 +237,7 @@ def let_through(logs: list[str], mistakes: list[str], seed: int) -> None:
 
 def _confirmed(case: Case, data: Dataset) -> set[str] | None:
     """Effects that a diagnosis confirms beyond the textbook's; None where it refuses the log."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "log.h5"
-        write_dataset(file, data, {})
+    with _file(data) as file:
         try:
             found = diagnose(case, file, tell=lambda note: None)
         except ExciteError:
@@ -247,9 +252,7 @@ def _confirmed(case: Case, data: Dataset) -> set[str] | None:
 
 def _is_noticed(case: Case, altered: Altered, sound: float) -> bool:
     """Whether the textbook's error rises."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "log.h5"
-        write_dataset(file, altered.data, {})
+    with _file(altered.data) as file:
         return not _error(_case(case, altered.robot), file) <= HARMLESS * sound
 
 
@@ -258,9 +261,7 @@ def sound(count: int, seed: int) -> None:
     words: Counter[str] = Counter()
     logs = 0
     for each in sound_logs(count, seed):
-        with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder) / "log.h5"
-            write_dataset(file, each.data, {})
+        with _file(each.data) as file:
             try:
                 found = inspect(_case(each.case, {}), file, tell=lambda note: None)
                 true = TRUE | ({"mount"} if each.leans else set())

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.campaigns.motions import series, short_moves
-from benchmarks.campaigns.robots import robot_of
+from benchmarks.battery.series import robot_of, series, short_moves
 from excite_cli.api.loading import Case
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.load import load_spec

@@ -1,8 +1,8 @@
 """Sound recordings, of which nothing should be said: simulated campaigns, and real robots.
 
-Campaigns are those of `benchmarks.campaigns`: several robots, series and short moves, payloads,
-friction that changes, noise with and without memory, encoders of 17 to 21 bits. Every third one has
-encoders of 15 bits and torques in steps of a hundredth of their largest.
+Campaigns are those of the battery: several robots, series and short moves, payloads, friction that
+changes, noise with and without memory, encoders of 17 to 21 bits. Every third one has encoders of
+15 bits and torques in steps of a hundredth of their largest.
 """
 
 from collections.abc import Iterator
@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.altered.recordings import CONFIGS, REAL, recording
-from benchmarks.campaigns.cases import make_case
-from benchmarks.campaigns.judge import campaign
+from benchmarks.battery.campaigns import make_case
+from benchmarks.battery.judge import data_of
 from excite_cli.api.loading import Case
 from excite_cli.measurement.dataset import Dataset, Run
 
@@ -46,7 +46,7 @@ def sound_logs(simulated: int, seed: int) -> Iterator[Sound]:
             yield Sound(f"{name} {run.name}", of.case, replace(of.data, runs=(run,)))
     for index in range(simulated):
         case = make_case(seed, index)
-        data = campaign(case).dataset
+        data = data_of(case).dataset
         coarse = index % 3 == 0
         if coarse:
             data = replace(data, runs=tuple(map(_coarse, data.runs)))

@@ -9,25 +9,24 @@ on one joint or on two.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Literal
 
 import numpy as np
 
-from benchmarks.battery.history import HISTORY
+from benchmarks.battery.instruments import Instruments
 from benchmarks.battery.motions import ROBOTS, Arm, arm, four_motions
-from benchmarks.battery.outside import OUTSIDE
+from benchmarks.battery.outside import HISTORY, OUTSIDE
+from benchmarks.battery.scoring import Name, Plant
 from benchmarks.battery.sizes import Ground, Sized, ground_of, size
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.spec import Spec
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue, declared_effects, kind_named
-from excite_cli.robot.model import Array
+from excite_cli.measurement.dataset import Dataset
+from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.build import true_inertias
-from excite_cli.simulation.ground_truth import sized
-from excite_cli.simulation.planned_motion import PlannedMotion
+from excite_cli.simulation.ground_truth import Planted, sized
+from excite_cli.simulation.planned_motion import Planned, PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
-
-Group = Literal["one", "clean", "outside", "two", "absorbed", "hard", "history"]
 
 _DECLARED = 0.65  # of the cases
 _ROBOT_SHARES = (0.45, 0.38, 0.17)
@@ -42,26 +41,66 @@ _ATTEMPTS = 60
 
 @dataclass(frozen=True)
 class Case:
-    """All that `simulate` and `diagnose` need. `spec` holds the declared model.
+    """All that recording, diagnosing and judging need. `spec` holds the declared model.
 
-    `visible`: share of the effects' energy that the declared model leaves.
+    `plants`: everything that is in the robot and not declared; `visible`: of each the share of its
+    energy that the declared model leaves. `friction`: plain friction is "declared", "undeclared"
+    (in the robot, to be found) or "none". `data`: what was recorded already, in place of motions.
     """
 
     index: int
-    group: Group
+    group: str
     robot: Arm
-    motions: tuple[PlannedMotion, ...]
+    motions: tuple[Planned, ...]
     settings: SimulationSettings
     spec: Spec
-    planted: tuple[Sized, ...]
-    visible: tuple[float, ...]
+    plants: tuple[Plant, ...]
+    friction: str
+    visible: tuple[float, ...] = ()
+    instruments: Instruments | None = None
+    hidden: tuple[Planted, ...] = ()
+    held_out: str | None = None
+    data: Dataset | None = None
+    words: str = ""
 
     @property
-    def has_friction(self) -> bool:
-        return bool(self.spec.effects)
+    def runs(self) -> tuple[str, ...]:
+        return tuple(motion.name for motion in self.motions)
+
+    @property
+    def planted(self) -> tuple[Planted, ...]:
+        """What the simulated robot has beside what is declared."""
+        return (*(p for plant in self.plants for p in plant.effects), *self.hidden)
 
 
-Label = Callable[[int, int], tuple[Group, str]]
+def sized_case(
+    index: int, group: str, of: Arm, motions: Sequence[PlannedMotion],
+    settings: SimulationSettings, friction: tuple[EffectSpec, ...], planted: Sequence[Sized],
+    shows: Sequence[float],
+) -> Case:  # fmt: skip
+    """A case of effects that have their sizes."""
+    spec = of.spec.model_copy(update={"effects": friction})
+    plants = tuple(plant_of(one, of.robot) for one in planted)
+    words = "declared" if friction else "none"
+    return Case(index, group, of, tuple(motions), settings, spec, plants, words, tuple(shows))
+
+
+def plant_of(one: Sized, robot: Robot) -> Plant:
+    """The effect as it is scored."""
+
+    def name(planted: Planted) -> Name:
+        return Name(planted.effect.kind, tuple(robot.joint_names[j] for j in planted.effect.joints))
+
+    own = name(one.planted)
+    return Plant(
+        (own.kind,), own.joints, (one.planted, *one.companions),
+        companions=tuple(map(name, one.companions)),
+        touched=tuple(robot.joint_names[j] for j in one.touched),
+        strongest=robot.joint_names[one.strongest], ratio=one.ratio,
+    )  # fmt: skip
+
+
+Label = Callable[[int, int], tuple[str, str]]
 
 
 @cache
@@ -76,9 +115,9 @@ def kinds() -> tuple[str, ...]:
 
 
 @cache
-def _deck(seed: int, number: int) -> tuple[tuple[Group, str], ...]:
+def _deck(seed: int, number: int) -> tuple[tuple[str, str], ...]:
     """Group and kind of 36 cases; kinds of several effects are drawn with the case."""
-    cards: list[tuple[Group, str]] = [("one", kind) for kind in kinds()]
+    cards: list[tuple[str, str]] = [("one", kind) for kind in kinds()]
     for k in range(number, number + 7):
         cards.append(("clean", ("any", "correlated")[k % 2]))
     for k in range(2):
@@ -89,13 +128,13 @@ def _deck(seed: int, number: int) -> tuple[tuple[Group, str], ...]:
     return tuple(cards[i] for i in order)
 
 
-def label(seed: int, index: int) -> tuple[Group, str]:
+def label(seed: int, index: int) -> tuple[str, str]:
     """Group and kind of a case, without making it."""
     length = len(kinds()) + 14
     return _deck(seed, index // length)[index % length]
 
 
-def label_of_history(seed: int, index: int) -> tuple[Group, str]:
+def label_of_history(seed: int, index: int) -> tuple[str, str]:
     """As `label`, of cases of friction with memory."""
     return "history", ("dahl_by_speed", "dahl_by_speed", "maxwell_slip")[index % 3]
 
@@ -111,9 +150,7 @@ def make_case(seed: int, index: int, labelled: Label = label) -> Case:
     raise RuntimeError(f"case {index} of seed {seed} ({group} {kind}) cannot be made")
 
 
-def _attempt(
-    seed: int, index: int, group: Group, kind: str, rng: np.random.Generator
-) -> Case | None:
+def _attempt(seed: int, index: int, group: str, kind: str, rng: np.random.Generator) -> Case | None:
     of = arm(str(rng.choice(ROBOTS, p=_ROBOT_SHARES)))
     with_friction = rng.uniform() < _DECLARED
     if kind in ("viscous_friction", "coulomb_friction"):
@@ -123,13 +160,12 @@ def _attempt(
     motions = four_motions(of.name, seed, rng)
     settings = settings_of(rng, kind == "correlated")
     friction = _FRICTION if with_friction else ()
-    spec = of.spec.model_copy(update={"effects": friction})
     ground, model = ground_and_model(of, motions, settings, friction)
     planted = _planted(group, kind, of, ground, model, with_friction, rng)
     if planted is None:
         return None
     shows = tuple(left_over(model, one, ground) for one in planted)
-    return Case(index, group, of, motions, settings, spec, planted, shows)
+    return sized_case(index, group, of, motions, settings, friction, planted, shows)
 
 
 def ground_and_model(
@@ -162,7 +198,7 @@ def settings_of(rng: np.random.Generator, correlated: bool) -> SimulationSetting
 
 
 def _planted(
-    group: Group,
+    group: str,
     kind: str,
     of: Arm,
     ground: Ground,

@@ -12,11 +12,11 @@ import numpy as np
 
 from benchmarks.battery.cases import (
     Case,
-    Group,
     ground_and_model,
     left_over,
     orthonormal,
     settings_of,
+    sized_case,
     weighted_columns,
 )
 from benchmarks.battery.motions import Arm, arm, four_motions
@@ -32,7 +32,7 @@ _SHOWS = 0.02  # share of an effect's energy that the model and the other effect
 _ATTEMPTS = 80
 
 
-def label(seed: int, index: int) -> tuple[Group, str]:
+def label(seed: int, index: int) -> tuple[str, str]:
     """Group and topic of a case, without making it."""
     order = np.random.default_rng([seed, 37, index // len(TOPICS)]).permutation(len(TOPICS))
     return "hard", list(TOPICS)[order[index % len(TOPICS)]]
@@ -55,13 +55,12 @@ def _attempt(seed: int, index: int, topic: str, rng: np.random.Generator) -> Cas
     motions = motions[: int(rng.choice(_MOTIONS.get(topic, (4,))))]
     settings = settings_of(rng, correlated=topic == "constant")
     friction = FRICTION if rng.uniform() < _DECLARED.get(topic, 0.5) else ()
-    spec = of.spec.model_copy(update={"effects": friction})
     ground, model = ground_and_model(of, motions, settings, friction)
     planted = TOPICS[topic](of, ground, rng)
     if not planted or not _separate(planted, ground, model):
         return None
     shows = tuple(left_over(model, one, ground) for one in planted)
-    return Case(index, "hard", of, motions, settings, spec, tuple(planted), shows)
+    return sized_case(index, "hard", of, motions, settings, friction, planted, shows)
 
 
 def _separate(planted: Sequence[Sized], ground: Ground, model: Array) -> bool:

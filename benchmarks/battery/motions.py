@@ -79,21 +79,25 @@ def trajectory() -> FourierTrajectory:
 
 
 def _draw(of: Arm, rng: np.random.Generator) -> Array:
+    push = np.minimum(of.robot.limits.acceleration, ACCELERATION[of.name])
+    return waves(of, trajectory(), 400, of.robot.limits.velocity, push, rng)
+
+
+def waves(
+    of: Arm, along: FourierTrajectory, instants: int, fastest: Array, push: Array | float,
+    rng: np.random.Generator,
+) -> Array:  # fmt: skip
     """Random series about a random centre, every joint scaled to its own limits."""
-    n, limits = of.robot.n, of.robot.limits
-    lower, upper = (np.clip(x, -np.pi, np.pi) for x in limits.ranges())
-    slope = rng.uniform(0.3, 1.3)
-    falling = np.arange(1, HARMONICS + 1) ** -slope
-    waves = rng.normal(size=(2 * HARMONICS, n)) * np.tile(falling, 2)[:, None]
-    basis = trajectory().basis(np.arange(400) * SECONDS / 400)
-    shape = np.vstack([waves, np.zeros((1, n))])
-    q, v, a = basis.states(shape)
+    n = of.robot.n
+    lower, upper = (np.clip(x, -np.pi, np.pi) for x in of.robot.limits.ranges())
+    falling = np.arange(1, HARMONICS + 1) ** -rng.uniform(0.3, 1.3)
+    drawn = rng.normal(size=(2 * HARMONICS, n)) * np.tile(falling, 2)[:, None]
+    shape = np.vstack([drawn, np.zeros((1, n))])
+    q, v, a = along.basis(np.arange(instants) * along.duration / instants).states(shape)
     highest, lowest = q.max(axis=0), q.min(axis=0)
     room = (upper - lower) / np.maximum(highest - lowest, 1e-12)
-    speed = limits.velocity / np.abs(v).max(axis=0)
-    push = np.minimum(limits.acceleration, ACCELERATION[of.name]) / np.abs(a).max(axis=0)
+    speed, push = fastest / np.abs(v).max(axis=0), push / np.abs(a).max(axis=0)
     scale = np.min([room, speed, push], axis=0) * rng.uniform(0.6, 0.9, n)
     shape *= scale
-    free = (lower - scale * lowest, upper - scale * highest)  # centres that keep the limits
-    shape[-1] = rng.uniform(*free)
+    shape[-1] = rng.uniform(lower - scale * lowest, upper - scale * highest)  # keeps the limits
     return shape

@@ -6,8 +6,6 @@ limits of its URDF, `soft_lim`, attempts, iterations, waypoints and rates of its
 
 import json
 import math
-import os
-import subprocess
 import sys
 import tempfile
 from dataclasses import dataclass
@@ -17,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.peers.race import Race, States
+from benchmarks.program import ran
 from excite_cli.robot.description import RobotDescription
 
 HOW_TO_INSTALL = """\
@@ -74,7 +73,7 @@ class Figaroh:
         """
         request = {
             "urdf": str(self.description.path),
-            "package_dirs": self.description.package_dirs,
+            "package_dirs": package_folders(self.description),
             "joints": JOINTS,
             "limits": LIMITS,
             "self_collision": self_collision,
@@ -115,21 +114,20 @@ def _states(answer: dict[str, Any], kind: str) -> States:
     return States(*(answer[f"{kind}_{symbol}"] for symbol in "tqva"))
 
 
+def package_folders(description: RobotDescription) -> list[str]:
+    """Where Pinocchio looks for `package://NAME/…`: in a folder that holds NAME, or in NAME."""
+    folders = description.package_dirs
+    return [*folders, *(str(Path(folder).parent) for folder in folders)]
+
+
 def run_driver(program: list[str], request: dict[str, Any]) -> dict[str, Any]:
     """What a driver answers, run on one thread in a process of its own."""
-    one = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     with tempfile.TemporaryDirectory() as folder:
         asked, answered = Path(folder, "request.json"), Path(folder, "answer.npz")
         asked.write_text(json.dumps(request))
-        done = subprocess.run(
-            [*program, str(asked), str(answered)],
-            env=os.environ | one,
-            capture_output=True,
-            text=True,
-            cwd=Path(__file__).parents[2],
-        )
-        if done.returncode or not answered.is_file():
-            raise SystemExit(f"{program[-1]} failed:\n{done.stderr.strip()[-2000:]}")
+        done = ran([*program, asked, answered])
+        if done.status or not answered.is_file():
+            raise SystemExit(f"{program[-1]} failed:\n{done.errors.strip()[-2000:]}")
         with np.load(answered) as found:
             return dict(found)
 
@@ -139,7 +137,7 @@ def find(python: Path | None, description: RobotDescription) -> Figaroh | None:
     interpreter = Path(sys.executable) if python is None else python.absolute()
     asked = "import figaroh.optimal.base_optimal_trajectory, cyipopt"
     try:
-        done = subprocess.run([str(interpreter), "-c", asked], capture_output=True)
+        done = ran([interpreter, "-c", asked])
     except OSError:
         return None
-    return None if done.returncode else Figaroh(interpreter, description)
+    return None if done.status else Figaroh(interpreter, description)

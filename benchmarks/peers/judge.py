@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from benchmarks.peers.figaroh_races import ACCELERATION, JOINTS, LIMITS
+from benchmarks.peers.figaroh_races import ACCELERATION, JOINTS, LIMITS, package_folders
 from benchmarks.peers.race import Race, States
 from excite_cli import load_problem
 from excite_cli.constraints.base import Array
@@ -139,7 +139,7 @@ class Judge:
             description.xml,
             pin.GeometryType.COLLISION,
             None,
-            list(description.package_dirs),
+            package_folders(description),
         )
         objects = geometry.geometryObjects
         for i, first in enumerate(objects):

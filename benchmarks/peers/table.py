@@ -1,11 +1,11 @@
 """The table of a comparison, as Markdown: dated, with goals, every figure from the races."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.marked_part import MarkedPart
+from benchmarks.pages import MarkedPart, table
 from benchmarks.peers.figaroh_races import BLIND, CLAIMED, CLEAR
 from benchmarks.peers.judge import Verdict
 from benchmarks.peers.our_races import OURS, OWN
@@ -107,7 +107,7 @@ def goals(comparison: Comparison) -> str:
                 ],
             ]
     heads = ["columns", "goal", "FIGAROH", "excite, median (worst)", "ratio", "required", ""]
-    return _table(heads, rows) if rows else ""
+    return table(heads, rows) if rows else ""
 
 
 def reached(comparison: Comparison, measure: Measure) -> str:
@@ -127,7 +127,7 @@ def reached(comparison: Comparison, measure: Measure) -> str:
                 ),
             ]
         )
-    return _table(heads, rows)
+    return table(heads, rows)
 
 
 def motions(comparison: Comparison) -> str:
@@ -157,7 +157,7 @@ def motions(comparison: Comparison) -> str:
                 _admissible(race, verdict),
             ]
         )
-    return _table(heads, rows)
+    return table(heads, rows)
 
 
 def _why(race: Race) -> str:
@@ -202,8 +202,3 @@ def times(value: float) -> str:
 
 def passed(good: bool) -> str:
     return "met" if good else "MISSED"
-
-
-def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

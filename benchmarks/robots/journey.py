@@ -6,21 +6,17 @@ is a record of plain values, for a JSON file.
 
 import contextlib
 import json
-import os
-import subprocess
 import sys
-import tempfile
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
-from threading import Timer
 from typing import Any
 
-from benchmarks.battery.scoring import Answer, Found, Name, Plant, score
+from benchmarks.battery.scoring import Name, Truth, answer_of_json, plant_of_record, score
+from benchmarks.program import EXCITE, ran
 from benchmarks.robots.sources import Source
 
-ROOT = Path(__file__).resolve().parents[2]
 _LONGEST = 900.0  # [s] of one command
-_PROGRAM = "from excite_cli.cli.app import main; main()"
 _GOOD = ("true", "alias", "identity", "companion")
 
 Record = dict[str, Any]
@@ -37,48 +33,20 @@ class _Steps:
         self.folder, self.record = folder, record
 
     def excite(self, verb: str, *arguments: str | Path) -> Any:
-        words = ("-c", _PROGRAM, verb, *map(str, arguments), "--json")
-        return self.run(verb, words)
+        return self.run(verb, [*EXCITE, verb, *arguments, "--json"])
 
-    def run(self, step: str, words: tuple[str, ...]) -> Any:
-        status, answer, message, seconds = self._ran(words)
-        self.record["seconds"][step] = round(seconds, 1)
-        if status != 0 and not (step == "diagnose" and status == 1 and answer is not None):
-            self.record.update(failed=step, exit_status=status, message=message)
+    def run(self, step: str, words: Sequence[str | Path]) -> Any:
+        # The cache is empty: the first `init` is measured.
+        done = ran(words, self.folder, _LONGEST, XDG_CACHE_HOME=str(self.folder / "cache"))
+        self.record["seconds"][step] = round(done.processor, 1)
+        told = done.status == 1 and step == "diagnose" and done.answer is not None
+        if done.status != 0 and not told:
+            message = _message(done.errors) if done.status > 0 else f"signal {-done.status}"
+            if done.status == -9:
+                message = f"it took longer than {_LONGEST:g} s"
+            self.record.update(failed=step, exit_status=done.status, message=message)
             raise EndedError
-        return answer
-
-    def _ran(self, words: tuple[str, ...]) -> tuple[int, Any, str, float]:
-        """Exit status, answer, last message and processor seconds."""
-        own = {
-            "OPENBLAS_NUM_THREADS": "1",
-            "PYTHONPATH": str(ROOT),
-            "XDG_CACHE_HOME": str(self.folder / "cache"),  # empty: the first `init` is measured
-        }
-        with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err:
-            process = subprocess.Popen(
-                [sys.executable, "-P", *words],
-                cwd=self.folder,
-                env={**os.environ, **own},
-                stdin=subprocess.DEVNULL,
-                stdout=out,
-                stderr=err,
-            )
-            timer = Timer(_LONGEST, process.kill)
-            timer.start()
-            _, status, used = os.wait4(process.pid, 0)
-            timer.cancel()
-            process.returncode = os.waitstatus_to_exitcode(status)
-            out.seek(0)
-            err.seek(0)
-            answer, told = out.read(), err.read()
-        seconds = used.ru_utime + used.ru_stime
-        if process.returncode < 0:
-            killed = f"it took longer than {_LONGEST:g} s"
-            message = killed if process.returncode == -9 else f"signal {-process.returncode}"
-            return process.returncode, None, message, seconds
-        given = json.loads(answer) if answer.strip() else None
-        return process.returncode, given, _message(told), seconds
+        return done.answer
 
 
 def _message(told: str) -> str:
@@ -114,7 +82,14 @@ def _travel(source: Source, steps: _Steps, seed: int) -> None:
     record["proved"] = all(last["certified"].values())
     steps.excite("check", "robot.yaml", "motions.h5")
     record["admissible"] = True
-    draw = ("-m", "benchmarks.robots.planting", "robot.yaml", "motions.h5", str(seed))
+    draw = (
+        sys.executable,
+        "-m",
+        "benchmarks.robots.planting",
+        "robot.yaml",
+        "motions.h5",
+        str(seed),
+    )
     plant = steps.run("draw", draw)
     record["planted"] = plant
     effects = [word for text in plant["effects"] for word in ("--effect", text)]
@@ -125,30 +100,11 @@ def _travel(source: Source, steps: _Steps, seed: int) -> None:
 
 def judged(answer: dict[str, Any], plant: dict[str, Any]) -> Record:
     """What was named, and whether that is the planted effect alone."""
-    there = Plant(
-        Name(plant["kind"], tuple(plant["joints"])),
-        tuple(plant["touched"]),
-        tuple(Name(kind, tuple(joints)) for kind, joints in plant["companions"]),
-    )
-    close = {_key(each) for each in answer["approximations"]}
-    found = [
-        Found(_name(each), tuple(map(_name, each["alias_set"])), _key(each) in close)
-        for each in answer["effects"]
-    ]
-    told = Answer(
-        tuple(found),
-        tuple(map(_name, answer["absorbed"])),
-        tuple(each["joint"] for each in answer["unexplained"]),
-        tuple(
-            joint
-            for finding in answer["findings"]
-            if finding["kind"] == "saturated"
-            for joint in finding["joints"]
-        ),
-    )
-    result = score([there], told, plant["friction"], plant["moved"])
+    told = answer_of_json(answer)
+    friction = "declared" if plant["friction"] else "none"
+    result = score(Truth([plant_of_record(plant)], plant["moved"], friction), told)
     return {
-        "named": [f"{each.name.kind} of {', '.join(each.name.joints)}" for each in found],
+        "named": [_words(each.called.name) for each in told.named],
         "verdicts": list(result.names),
         "right": result.right,
         "alone": result.right and _is_alone(result.names),
@@ -166,12 +122,8 @@ def _is_alone(verdicts: tuple[str, ...]) -> bool:
     return once and all(name in _GOOD for name in verdicts)
 
 
-def _key(each: dict[str, Any]) -> tuple[Any, ...]:
-    return each["kind"], tuple(each["joints"]), tuple(each["runs"])
-
-
-def _name(each: dict[str, Any]) -> Name:
-    return Name(each["kind"], tuple(each["joints"]))
+def _words(name: Name) -> str:
+    return f"{name.kind} of {', '.join(name.joints)}"
 
 
 def _ignored(config: Path) -> int:

@@ -11,8 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.battery.cases import Arm, ground_and_model, kinds, left_over, one_effect
-from benchmarks.battery.judge import plant_of
+from benchmarks.battery.cases import (
+    Arm,
+    ground_and_model,
+    kinds,
+    left_over,
+    one_effect,
+    plant_of,
+)
 from benchmarks.battery.sizes import Sized
 from excite_cli.api.loading import load_case
 from excite_cli.api.motions import load_motions

@@ -1,14 +1,13 @@
 """Tools as processes of their own: what each answers, its processor time, lines a user writes."""
 
-import json
-import os
-import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from benchmarks.program import EXCITE as EXCITE_PROGRAM
+from benchmarks.program import Ended, ran
 from benchmarks.scoreboard.case import Case
 from benchmarks.scoreboard.exchange import lines_of_user, read_answer
 from benchmarks.scoreboard.judge import Judge, Verdict
@@ -17,7 +16,6 @@ FOLDER = Path(__file__).parent
 EXCITE, BODIES = "excite", "excite, bodies that can be"
 FIGAROH, TOLD, SYSID = "FIGAROH", "FIGAROH, coupling told", "mujoco.sysid"
 WLS, URDF = "least squares", "URDF untouched"
-_PROGRAM = "from excite_cli.cli.app import main; main()"
 _LONGEST = 1800  # [s] of one tool on one log
 # What does better on the held-out data is taken: FIGAROH's decimation by 10 or none, steps of
 # mujoco.sysid as they are or scaled by its Jacobian.
@@ -75,7 +73,7 @@ def tried(tool: Tool, judge: Judge, folder: Path) -> Result:
 def _tried(tool: Tool, way: Sequence[str], judge: Judge, folder: Path) -> Result:
     answer = folder / f"{tool.driver.stem}.npz"
     answer.unlink(missing_ok=True)
-    run = ran([tool.python, tool.driver, folder, answer, *way])
+    run = ran([tool.python, tool.driver, folder, answer, *way], longest=_LONGEST)
     lines = lines_of_user(tool.driver)
     if not answer.is_file():
         return Result(tool.name, None, run.processor, lines, run.last)
@@ -83,40 +81,9 @@ def _tried(tool: Tool, way: Sequence[str], judge: Judge, folder: Path) -> Result
     return Result(tool.name, judge.verdict(torques, phi), run.processor, lines, told)
 
 
-@dataclass(frozen=True)
-class Ran:
-    """How a process ended: its output, the last line of its errors, its processor time [s]."""
-
-    output: str
-    last: str
-    processor: float
-    failed: bool
-
-
-def ran(words: Sequence[str | Path]) -> Ran:
-    """A process with one thread for its matrices; it is ended after half an hour."""
-    before = os.times()
-    try:
-        done = subprocess.run(
-            [*map(str, words)],
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=_LONGEST,
-        )
-        output, last = done.stdout, (done.stderr.strip().splitlines() or [""])[-1]
-        failed = done.returncode != 0
-    except subprocess.TimeoutExpired:
-        output, last, failed = "", f"no answer within {_LONGEST} s", True
-    after = os.times()
-    used = after.children_user + after.children_system
-    return Ran(output, last, used - before.children_user - before.children_system, failed)
-
-
-def excite(case: Case, stored: Path) -> tuple[dict[str, Any] | None, Ran]:
+def excite(case: Case, stored: Path) -> tuple[dict[str, Any] | None, Ended]:
     """What `excite diagnose` says, with the diagnosis in the file `stored`."""
     held_out = () if case.held_out is None else ("--held-out", case.held_out)
     files = (case.config, case.data, *held_out, "-o", stored, "--overwrite")
-    run = ran([sys.executable, "-c", _PROGRAM, "diagnose", *files, "--json", "--no-progress"])
-    return (json.loads(run.output) if run.output.strip() else None), run
+    run = ran([*EXCITE_PROGRAM, "diagnose", *files, "--json", "--no-progress"], longest=_LONGEST)
+    return run.answer, run

@@ -1,10 +1,11 @@
 """excite as its user runs it: `excite diagnose` of a config that declares no effect."""
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from benchmarks.battery.scoring import Answer, Found, Name, Plant, score
+from benchmarks.battery.scoring import Truth, answer_of_json, plant_of_record, score
 from benchmarks.scoreboard.case import Case
 from benchmarks.scoreboard.contestants import BODIES, EXCITE, Result, excite
 from benchmarks.scoreboard.judge import Judge
@@ -42,27 +43,7 @@ def lines_of_config(config: Path) -> int:
 
 def verdicts(answer: dict[str, Any], case: Case, joints: int) -> dict[str, int]:
     """How many named effects are true, …, wrong; how many are `planted`, and how many `told`."""
-    plants = [
-        Plant(
-            Name(each["kind"], tuple(each["joints"])),
-            tuple(each["touched"]),
-            tuple(Name(kind, tuple(own)) for kind, own in each["companions"]),
-        )
-        for each in case.planted
-    ]
-    close = {_key(each) for each in answer["approximations"]}
-    found = tuple(
-        Found(_name(each), tuple(map(_name, each["alias_set"])), _key(each) in close)
-        for each in answer["effects"]
-    )
-    told = Answer(found, tuple(map(_name, answer["absorbed"])))
-    scored = score(plants, told, False, joints)
+    plants = [plant_of_record(each) for each in case.planted]
+    told = replace(answer_of_json(answer), saturated=frozenset())  # by names alone
+    scored = score(Truth(plants, joints), told)
     return dict(Counter(scored.names)) | {"planted": len(plants), "told": sum(scored.found)}
-
-
-def _key(each: dict[str, Any]) -> tuple[Any, ...]:
-    return each["kind"], tuple(each["joints"]), tuple(each["runs"])
-
-
-def _name(each: dict[str, Any]) -> Name:
-    return Name(each["kind"], tuple(each["joints"]))

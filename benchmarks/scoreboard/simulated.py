@@ -12,12 +12,11 @@ import zlib
 from pathlib import Path
 from typing import Any
 
+from benchmarks.program import excite, ran
 from benchmarks.scoreboard.case import Case
-from benchmarks.scoreboard.contestants import ran
 from excite_cli.api.loading import load_case
 
 ROBOTS = ("ur5", "ur10", "panda", "kinova", "talos_left_arm", "z1", "xarm7", "ur3 as MJCF")
-_PROGRAM = "from excite_cli.cli.app import main; main()"
 _FRICTION = ("viscous_friction", "coulomb_friction")
 _SHORT = ("constraints.self_collision=null", "optimizer.max_seconds=5", "optimizer.restarts=1")
 _EFFECTS = "\neffects:\n  - {kind: viscous_friction}\n  - {kind: coulomb_friction}\n"
@@ -37,7 +36,7 @@ def simulated(seed: int, index: int, folder: Path) -> Case:
         drawn = _output("-m", "benchmarks.robots.planting", truth, motions, str(number))
         planted.write_text(drawn, encoding="utf-8")
         effects = [word for text in json.loads(drawn)["effects"] for word in ("--effect", text)]
-        _excite("simulate", truth, motions, "-o", data, "--seed", str(number % 2**31), *effects,
+        excite("simulate", truth, motions, "-o", data, "--seed", str(number % 2**31), *effects,
                 "--rate", "200", "--overwrite")  # fmt: skip
     record = json.loads(planted.read_text(encoding="utf-8"))
     words = f"{robot}: {record['kind'].replace('_', ' ')} of {', '.join(record['joints'])}"
@@ -53,11 +52,11 @@ def _planned(robot: str, folder: Path) -> tuple[Path, Path]:
     given: tuple[str | Path, ...] = ("--robot", robot)
     if robot.endswith(" as MJCF"):
         given = ("--urdf", _as_mjcf(robot.removesuffix(" as MJCF"), folder))
-    _excite("init", *given, "-o", config, "--overwrite")
+    excite("init", *given, "-o", config, "--overwrite")
     # Simulated robots do not collide, and motions need not be the best.
     short = [word for text in _SHORT for word in ("--set", text)]
     begun = folder / "begun.h5"  # what is interrupted holds fewer motions
-    _excite("optimize", config, "-o", begun, "--overwrite", "--no-progress", *short)
+    excite("optimize", config, "-o", begun, "--overwrite", "--no-progress", *short)
     return config, begun.rename(motions)
 
 
@@ -80,12 +79,8 @@ def _friction(config: Path) -> list[dict[str, Any]]:
     ]
 
 
-def _excite(*words: str | Path) -> None:
-    _output("-c", _PROGRAM, *words)
-
-
 def _output(*words: str | Path) -> str:
     run = ran([sys.executable, *words])
-    if run.failed:
+    if run.status:
         raise RuntimeError(f"{' '.join(map(str, words))}: {run.last}")
     return run.output

@@ -5,7 +5,7 @@ from math import isfinite
 
 import numpy as np
 
-from benchmarks.marked_part import MarkedPart
+from benchmarks.pages import MarkedPart, percent, table
 from benchmarks.scoreboard.contestants import (
     BODIES,
     EXCITE,
@@ -130,19 +130,6 @@ def row(words: str, errors: Sequence[float]) -> list[str]:
     """Errors in percent, the least of them bold."""
     least = min((each for each in errors if isfinite(each)), default=float("nan"))
     return [words, *(f"**{percent(x)}**" if x == least else percent(x) for x in errors)]
-
-
-def percent(value: float) -> str:
-    """`12 %`, `8.8 %`, `–` where there is none."""
-    if not isfinite(value):
-        return "–"
-    return f"{100 * value:.0f} %" if value >= 0.0995 else f"{100 * value:.1f} %"
-
-
-def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Markdown."""
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def _is_first(entry: Entry, tool: str) -> bool:

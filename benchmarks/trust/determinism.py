@@ -1,6 +1,6 @@
 """The same command twice, in fresh processes and under other circumstances: the same numbers?
 
-    python -m benchmarks.trust.determinism [--seeds 1]
+    python -m benchmarks.trust.determinism [--only CIRCUMSTANCE]
 
 On one machine every number in every file must be the same to the last bit, whatever the number of
 threads of the linear algebra library, the seed of Python's hashes, the folder, the language, and
@@ -12,10 +12,7 @@ numbers after the same number of iterations, is told.
 """
 
 import argparse
-import json
-import os
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
@@ -24,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks import program
 from benchmarks.trust.kill_commands import ROOT, SMOKE, Command, Content, config, numbers, words
 
 _COUNT = 20
@@ -38,6 +36,8 @@ CIRCUMSTANCES: dict[str, dict[str, str]] = {
     },
     "all threads, other hashes, another language": {
         "OPENBLAS_NUM_THREADS": "",
+        "OMP_NUM_THREADS": "",
+        "MKL_NUM_THREADS": "",
         "PYTHONHASHSEED": "2",
         "LC_ALL": "tr_TR.UTF-8",
         "LANG": "tr_TR.UTF-8",
@@ -118,16 +118,9 @@ def _chain(folder: Path, changes: Mapping[str, str]) -> dict[str, Content]:
 
 
 def excite(arguments: tuple[str, ...], folder: Path, changes: Mapping[str, str]) -> None:
-    """Run the installed program to its good end."""
-    program = shutil.which("excite", path=f"{Path(sys.executable).parent}:{os.defpath}")
-    assert program is not None, "excite is not installed"
+    """Run the program to its good end."""
     more = {key: value.format(folder=folder) for key, value in changes.items()}
-    environment = {k: v for k, v in {**os.environ, **_BASE, **more}.items() if v}
-    run = subprocess.run(
-        [program, *arguments], cwd=folder, env=environment, capture_output=True, text=True,
-        check=False, stdin=subprocess.DEVNULL,
-    )  # fmt: skip
-    assert run.returncode == 0, f"{' '.join(arguments)}: {run.stderr}"
+    program.excite(*arguments, folder=folder, **{**_BASE, **more})
 
 
 def _tell_same(name: str, first: dict[str, Content], second: dict[str, Content]) -> int:
@@ -179,7 +172,7 @@ def _kernels(root: Path) -> None:
         try:
             excite(_optimize(output), folder, changes)
             costs[kernel] = _at_a_motion(root / "plain" / "motions.h5", changes)
-        except (AssertionError, subprocess.CalledProcessError):
+        except RuntimeError:
             print(f"kernel {kernel}: this processor cannot run it")
             continue
         content = numbers(folder / output)
@@ -201,12 +194,8 @@ def _kernels(root: Path) -> None:
 
 
 def _at_a_motion(result: Path, changes: Mapping[str, str]) -> Any:
-    run = subprocess.run(
-        [sys.executable, "-c", _AT_A_MOTION, SMOKE, str(result)], cwd=ROOT, text=True,
-        env={k: v for k, v in {**os.environ, **_BASE, **changes}.items() if v},
-        capture_output=True, check=True,
-    )  # fmt: skip
-    return json.loads(run.stdout)
+    words = [sys.executable, "-c", _AT_A_MOTION, SMOKE, result]
+    return program.ran(words, ROOT, **{**_BASE, **changes}).answer
 
 
 if __name__ == "__main__":

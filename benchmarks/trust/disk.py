@@ -22,8 +22,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from benchmarks.trust.kill import import_everything, make_inputs
 from benchmarks.trust.kill_commands import COMMANDS, Command
-from benchmarks.trust.kill_start import forked, run
-from benchmarks.trust.kill_trial import Reference, undisturbed
+from benchmarks.trust.killing import Reference, forked, run, undisturbed
 
 SHARES = (0.0, 0.3, 0.6, 0.95)  # of the room that is needed for all that is written at once
 _ROOM, _PAGE, _NOBODY = 32 << 20, 4096, 65534

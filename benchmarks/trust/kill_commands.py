@@ -2,11 +2,22 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
+from PIL import Image
+
+from excite_cli.config.data_spec import MeasurementSpec
+from excite_cli.config.load import load_spec
+from excite_cli.export.motions import MOTION_EXPORTERS
+from excite_cli.measurement.catalogue import read_dataset
+from excite_cli.measurement.motion_files import read_own_motion
+from excite_cli.store.diagnosis_file import read_diagnosis
+from excite_cli.store.fit_file import read_fit
+from excite_cli.store.result_file import read_result
 
 ROOT = Path(__file__).resolve().parents[2]
 SMOKE = str(ROOT / "configs" / "smoke.yaml")
@@ -57,49 +68,33 @@ def _bits(value: Any) -> Any:
     return array.tolist() if array.dtype.hasobject else array.tobytes()
 
 
-def _result(path: Path) -> Content:
-    from excite_cli.store.result_file import read_result
-
-    read_result(path)
-    return numbers(path)
-
-
-def _fit(path: Path) -> Content:
-    from excite_cli.store.fit_file import read_fit
-
-    read_fit(path)
-    return numbers(path)
+def _after(read: Callable[[Path], Any], content: Callable[[Path], Content], path: Path) -> Content:
+    """The content of a file that its own reader takes."""
+    read(path)
+    return content(path)
 
 
-def _diagnosis(path: Path) -> Content:
-    from excite_cli.store.diagnosis_file import read_diagnosis
-
-    read_diagnosis(path)
+def _without_seconds(path: Path) -> Content:
     return {name: bits for name, bits in numbers(path).items() if "seconds" not in name}
 
 
-def _data(path: Path) -> Content:
-    from excite_cli.config.data_spec import MeasurementSpec
-    from excite_cli.measurement.catalogue import read_dataset
-
-    names = tuple(h5py.File(path).attrs["joint_names"])
+def _read_data(path: Path) -> None:
+    with h5py.File(path) as file:
+        names = tuple(file.attrs["joint_names"])
     read_dataset([path], MeasurementSpec(), names)
-    return numbers(path)
 
 
 def _motion(path: Path) -> Content:
-    from excite_cli.measurement.motion_files import read_own_motion
-
     motion = read_own_motion(path)
     states = (motion.t, motion.q, motion.v, motion.a)
     return [None if array is None else array.tobytes() for array in states]
 
 
-def config(path: Path) -> Content:
-    from excite_cli.config.load import load_spec
-
-    load_spec(path, [])
-    return path.read_bytes()
+_result = partial(_after, read_result, numbers)
+_fit = partial(_after, read_fit, numbers)
+_diagnosis = partial(_after, read_diagnosis, _without_seconds)
+_data = partial(_after, _read_data, numbers)
+config = partial(_after, load_spec, Path.read_bytes)
 
 
 def _page(path: Path) -> Content:
@@ -109,15 +104,9 @@ def _page(path: Path) -> Content:
 
 
 def _picture(path: Path) -> Content:
-    from PIL import Image
-
     with Image.open(path) as image:
         image.load()
         return image.size, image.convert("RGB").tobytes()
-
-
-def _text(path: Path) -> Content:
-    return path.read_bytes()
 
 
 def words(*texts: str) -> tuple[str, ...]:
@@ -145,7 +134,12 @@ FIT = Command(
         SMOKE,
         "../inputs/data.h5 -o fit.h5 --urdf new.urdf --mjcf new.xml --parameters new.yaml",
     ),
-    {"fit.h5": _fit, "new.urdf": _text, "new.xml": _text, "new.yaml": _text},
+    {
+        "fit.h5": _fit,
+        "new.urdf": Path.read_bytes,
+        "new.xml": Path.read_bytes,
+        "new.yaml": Path.read_bytes,
+    },
 )
 DIAGNOSIS = Command(
     "diagnose",
@@ -155,8 +149,6 @@ DIAGNOSIS = Command(
 
 
 def _export(kind: str) -> Command:
-    from excite_cli.export.motions import MOTION_EXPORTERS
-
     name = f"motion{MOTION_EXPORTERS[kind].suffix}"
     asked = words("export ../inputs/motions.h5 --motion 1 --rate 100", "--format", kind, "-o")
     return Command(f"export {kind}", (*asked, name), {name: _motion})
@@ -188,7 +180,7 @@ COMMANDS = (
     Command(
         "export urdf",
         ("export", "../inputs/fit.h5", "--format", "urdf", "-o", "fit.urdf"),
-        {"fit.urdf": _text},
+        {"fit.urdf": Path.read_bytes},
     ),
     Command(
         "report",
@@ -210,6 +202,6 @@ COMMANDS = (
         words("view ../inputs/motions.h5 --gif arm.gif --size 160x120 --duration 0.5 --fps 4"),
         {"arm.gif": _picture},
     ),
-    Command("schema", ("schema", "-o", "schema.json"), {"schema.json": _text}),
+    Command("schema", ("schema", "-o", "schema.json"), {"schema.json": Path.read_bytes}),
 )
 INPUTS = (MOTIONS, DATA, FIT)

@@ -2,17 +2,22 @@
 
 import pytest
 
-from benchmarks.battery.scoring import Answer, Found, Name, Plant, score
+from benchmarks.battery.scoring import Answer, Called, Name, Named, Plant, Score, Truth
+from benchmarks.battery.scoring import score as scored
 
 JOINTS = 6
 
 
+def score(there: list[Plant], answer: Answer, friction: bool, joints: int) -> Score:
+    return scored(Truth(there, joints, "declared" if friction else "none"), answer)
+
+
 def plant(kind: str, *joints: str, companions: tuple[Name, ...] = ()) -> Plant:
-    return Plant(Name(kind, joints), joints, companions)
+    return Plant((kind,), joints, companions=companions, touched=joints)
 
 
-def named(kind: str, *joints: str, aliases: tuple[str, ...] = ()) -> Found:
-    return Found(Name(kind, joints), tuple(Name(alias, joints) for alias in aliases))
+def named(kind: str, *joints: str, aliases: tuple[str, ...] = ()) -> Named:
+    return Named(Called(Name(kind, joints)), tuple(Called(Name(a, joints)) for a in aliases))
 
 
 def test_kind_and_joint_must_both_be_true() -> None:
@@ -94,29 +99,28 @@ def test_two_effects_must_both_be_found() -> None:
 
 def test_unexplained_counts_as_detected_on_the_right_joint_only() -> None:
     there = [plant("outside:hysteresis", "j2")]
-    good = score(there, Answer((), unexplained=("j2",)), True, JOINTS)
+    good = score(there, Answer((), said=frozenset({"j2"})), True, JOINTS)
     assert good.detected
-    assert good.unexplained_there
+    assert good.there
     assert not good.right
-    assert not score(there, Answer((), unexplained=("j3",)), True, JOINTS).detected
+    assert not score(there, Answer((), said=frozenset({"j3"})), True, JOINTS).detected
 
 
 def test_clean_data_have_nothing_to_be_right_about() -> None:
     result = score([], Answer((named("spring", "j2"),)), True, JOINTS)
     assert result.wrong
-    assert not result.right
     assert not result.detected
 
 
 def test_saturation_may_be_told_by_the_checks_of_the_data() -> None:
     there = [plant("torque_saturation", "j2")]
-    assert score(there, Answer((), saturated=("j2",)), True, JOINTS).right
-    assert not score(there, Answer((), saturated=("j1",)), True, JOINTS).right
+    assert score(there, Answer((), saturated=frozenset({"j2"})), True, JOINTS).right
+    assert not score(there, Answer((), saturated=frozenset({"j1"})), True, JOINTS).right
 
 
 def test_an_approximation_is_neither_right_nor_wrong_but_is_seen() -> None:
     there = [plant("spring", "j2")]
-    near = Found(Name("spring", ("j2",)), approximation=True)
+    near = Named(Called(Name("spring", ("j2",))), approximation=True)
     result = score(there, Answer((near,)), True, JOINTS)
     assert result.names == ("approximation",)
     assert not result.right

@@ -6,13 +6,15 @@ from typing import Any
 
 import pytest
 
-from benchmarks.battery.scoring import Name
-from benchmarks.campaigns.judge import _differences
-from benchmarks.campaigns.plants import Plant
-from benchmarks.campaigns.scoring import Answer, Called, Named, Score, Truth, score
+from benchmarks.battery.judge import differences
+from benchmarks.battery.scoring import Answer, Called, Name, Named, Plant, Score, Truth, score
 
 JOINTS = ("j1", "j2", "j3")
 TRAINING = ("a", "b", "c", "d")
+
+
+def truth_of(*there: Plant, friction: str = "none", training: tuple[str, ...] = TRAINING) -> Truth:
+    return Truth(there, len(JOINTS), friction, frozenset(training), "j3")
 
 
 def plant(
@@ -26,7 +28,7 @@ def named(kind: str, *joints: str, runs: str = "", aliases: tuple[Called, ...] =
 
 
 def judged(there: Plant, *names: Named, friction: str = "none", said: str = "") -> Score:
-    truth = Truth((there,), frozenset(TRAINING), JOINTS, "j3", friction)
+    truth = truth_of(there, friction=friction)
     return score(truth, Answer(names, (), frozenset({said} if said else ())))
 
 
@@ -98,7 +100,7 @@ def test_an_unknown_map_has_no_name_but_is_said() -> None:
 
 def test_friction_in_the_robot_is_true_but_not_required() -> None:
     background = Plant(("coulomb_friction",), ("j1",), (), required=False)
-    truth = Truth((background,), frozenset(TRAINING), JOINTS, "j3", "undeclared")
+    truth = truth_of(background, friction="undeclared")
     assert score(truth, Answer(())).right
     result = score(truth, Answer((named("coulomb_friction", "j1"),)))
     assert result.names == ("true",)
@@ -123,7 +125,7 @@ def test_sizes_of_friction_beside_what_was_missed_do_not_count(
 ) -> None:
     friction = Plant(("coulomb_friction",), ("j1",), (), sizes={"coulomb": 1.0}, required=False)
     spring = plant("spring", joint)
-    truth = Truth((friction, spring), frozenset(TRAINING), JOINTS, "j3", "undeclared")
+    truth = truth_of(friction, spring, friction="undeclared")
     coulomb = Named(Called(Name("coulomb_friction", ("j1",))), sizes={"coulomb": (1.5, 0.1)})
     names = (coulomb, named("spring", joint)) if found else (coulomb,)
     assert len(score(truth, Answer(names)).sizes) == counts
@@ -152,10 +154,10 @@ def test_by_what_two_recordings_are_said_to_differ_is_found() -> None:
     """No model has it: which of two recordings is usual is not known."""
     text = "r1 and r2 differ: torque_offset of j1 by -0.05 N·m in r2; friction of j2 and j3 by +1"
     said: Any = SimpleNamespace(findings=[SimpleNamespace(kind="runs_differ", text=text)])
-    differences = _differences(said)
-    assert differences == {Name("torque_offset", ("j1",)), Name("friction", ("j2", "j3"))}
-    truth = Truth((plant("torque_offset", "j1", runs="b"),), frozenset("ab"), JOINTS, "j3")
-    assert score(truth, Answer((), differences=differences)).right
+    found = differences(said)
+    assert found == {Name("torque_offset", ("j1",)), Name("friction", ("j2", "j3"))}
+    truth = truth_of(plant("torque_offset", "j1", runs="b"), training=("a", "b"))
+    assert score(truth, Answer((), differences=found)).right
     assert not score(truth, Answer((), differences=frozenset({Name("torque_gain", ("j1",))}))).right
-    steady = Truth((plant("torque_offset", "j1"),), frozenset("ab"), JOINTS, "j3")
-    assert not score(steady, Answer((), differences=differences)).right
+    steady = truth_of(plant("torque_offset", "j1"), training=("a", "b"))
+    assert not score(steady, Answer((), differences=found)).right

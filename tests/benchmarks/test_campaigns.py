@@ -6,20 +6,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.campaigns import judge as judging
-from benchmarks.campaigns.cases import (
+from benchmarks.battery import judge as judging
+from benchmarks.battery.campaigns import (
     CLEAN,
     FIRST_WITH_COLUMNS,
     GROUPS,
     WITH_COLUMNS,
-    Case,
     group_of,
     make_case,
 )
-from benchmarks.campaigns.instruments import Instruments, recorded
-from benchmarks.campaigns.judge import Judged, Outcome, campaign, judge, rests
-from benchmarks.campaigns.mechanisms import solid
-from benchmarks.campaigns.tables import failures, groups, rates, verdict
+from benchmarks.battery.cases import Case
+from benchmarks.battery.decks import DECKS
+from benchmarks.battery.instruments import Instruments, recorded
+from benchmarks.battery.judge import Judged, Outcome, data_of, judge, rests
+from benchmarks.battery.outside import solid
+from benchmarks.battery.tables import failures, groups, rates, verdict
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.measurement.dataset import Dataset, Run
 
@@ -126,8 +127,9 @@ def clean() -> tuple[Judged, Case]:
         instruments=replace(case.instruments, epochs=()),
     )
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(judging, "make_case", lambda seed, index: small)
-        return judge(SEED, index), small
+        deck = replace(DECKS["campaigns"], make_case=lambda seed, index: small)
+        patch.setattr(judging, "DECKS", {"campaigns": deck})
+        return judge(SEED, index, "campaigns"), small
 
 
 def test_a_case_from_its_making_to_its_score(clean: tuple[Judged, Case]) -> None:
@@ -143,7 +145,7 @@ def test_a_case_from_its_making_to_its_score(clean: tuple[Judged, Case]) -> None
 
 def test_a_rest_that_is_large_is_seen_by_the_truth(clean: tuple[Judged, Case]) -> None:
     judged, case = clean
-    data = campaign(case)
+    data = data_of(case)
     quiet = replace(data, noise={name: noise / 4 for name, noise in data.noise.items()})
     assert judged.diagnosis is not None
     loud = rests(case, quiet, judged.diagnosis)
@@ -172,7 +174,14 @@ class _Body:
 
 
 def outcome(index: int, group: str, **changes: object) -> Outcome:
-    found = Outcome(index, group, planted=["payload"], right=True, before=0.1, after=0.01)
+    found = Outcome(
+        index,
+        group,
+        planted=[{"words": "payload@j1", "ratio": np.nan}],
+        right=True,
+        before=0.1,
+        after=0.01,
+    )
     for name, value in changes.items():
         setattr(found, name, value)
     return found
@@ -189,12 +198,12 @@ def test_rates_count_what_went_wrong() -> None:
         outcome(2, "contact", silent=["j1"], rest={"j1": 3.0}),
         outcome(3, "contact", worse=True),
         outcome(4, "contact", worse=True, admitted=True),
-        outcome(5, "clean_white", planted=[], named=[false_name], wrong=True),
+        outcome(5, "clean_white", planted=[], named=[false_name], wrong=True, alarm=True),
         outcome(6, "clean_white", planted=[]),
-        outcome(8, "clean_white", planted=[], left=["j1"]),
+        outcome(8, "clean_white", planted=[], left=["j1"], alarm=True),
         outcome(7, "short_moves", refused=True, error="FileError: no"),
     ]
-    counts = {rate.name: (rate.count, rate.out_of) for rate in rates(outcomes)}
+    counts = {rate.name: (rate.count, rate.out_of) for rate in rates(outcomes, "campaigns")}
     assert counts == {
         "right name or alias set": (4, 6),
         "wrong names": (3, 9),

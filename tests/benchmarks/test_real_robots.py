@@ -88,7 +88,7 @@ def test_published_values_that_were_missed_are_named() -> None:
     words = tx40([answer(joints, own, pair, friction_lines=lines)])
     assert "coupled friction of joint_5–joint_6" in words
     assert "12 of 14 published" in words
-    assert "(viscous of joint_6: 23 % off, coulomb of joint_6: nan % off)" in words
+    assert "(viscous of joint_6: 23 % off, coulomb of joint_6: – off)" in words
 
 
 def test_the_spring_with_inertias_free_and_kept() -> None:

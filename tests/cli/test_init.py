@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.trust.fuzz_meshes import VALID
+from benchmarks.trust.robot_files import VALID
 from excite_cli.config.load import load_spec
 from tests.cli.program import BRIEF, EXCITE, Program, environment
 from tests.cli.terminal import seen_on_a_terminal

@@ -7,7 +7,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from benchmarks.whole_plant import WholePlant
 from excite_cli.config.constraints_spec import (
     ConstraintsSpec,
     ContactSpec,
@@ -33,6 +32,7 @@ from tests.constraints.test_gradients import check_gradients
 from tests.dynamics.test_uncertain_inertias import SPEC, knowledge
 from tests.excitation.smoke import CONFIG, one_motion, smoke
 from tests.robot.random_robots import random_robot
+from tests.whole_plant import WholePlant
 
 CORNERS = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))
 ALL = ConstraintsSpec(

@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.whole_plant import WholePlant
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
@@ -16,6 +15,7 @@ from excite_cli.dynamics.whole_robot import GroundWrench, drawn_states, whole_pa
 from excite_cli.excitation.gradient_check import central_differences, relative_error
 from excite_cli.robot.model import Robot, build_robot
 from tests.robot.random_robots import random_robot
+from tests.whole_plant import WholePlant
 
 ARMS = tuple(f"arm_{side}_{k}_joint" for side in ("left", "right") for k in range(1, 8))
 ROBOTS = {

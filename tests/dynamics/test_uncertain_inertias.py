@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import csc_matrix
 
-from benchmarks.uncertain_bodies import drawn_bodies
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.config.spec import BodyUncertaintySpec, UncertaintySpec
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
@@ -28,6 +27,7 @@ from excite_cli.dynamics.whole_robot import GroundWrench, drawn_states, whole_pa
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.excitation.gradient_check import central_differences
 from excite_cli.robot.model import Array, Robot, build_robot
+from tests.dynamics.drawn_bodies import drawn_bodies
 from tests.robot.random_robots import random_robot
 
 SPEC = UncertaintySpec(mass=0.2, center_of_mass=0.02, inertia=0.3)

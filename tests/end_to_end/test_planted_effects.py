@@ -1,6 +1,6 @@
 """Effects planted in MuJoCo robots are named: fast representatives of the battery.
 
-The cases come from a development seed; `python -m benchmarks.diagnosis_battery` judges on others.
+The cases come from a development seed; `python -m benchmarks.battery` judges on others.
 """
 
 import pytest
@@ -34,8 +34,8 @@ def outcome(index: int, seed: int = SEED) -> Outcome:
 def test_what_was_planted_is_named_and_nothing_else(index: int) -> None:
     found = outcome(index)
     assert [p["kind"] for p in found.planted] == [PLANTED[index]]
-    assert found.right, found.found
-    assert not found.wrong, found.found
+    assert found.right, found.named
+    assert not found.wrong, found.named
     assert found.ratio < 1.1  # of the error of the fit that knows the truth
 
 
@@ -43,12 +43,12 @@ def test_what_was_planted_is_named_and_nothing_else(index: int) -> None:
 def test_nothing_is_named_where_nothing_is_missing(index: int) -> None:
     found = outcome(index)
     assert found.planted == []
-    assert found.found == []
+    assert found.named == []
 
 
 def test_what_has_no_name_gets_none() -> None:
     found = outcome(2, seed=13)  # gears that rub on a sum of speeds, three joints apart
-    assert not found.wrong, found.found
+    assert not found.wrong, found.named
     told = {each["joint"]: each["depends_on"] for each in found.unexplained}
     assert set(told) == {"shoulder_pan_joint", "wrist_1_joint"}
     assert "v[wrist_1_joint]" in told["shoulder_pan_joint"]
@@ -57,9 +57,9 @@ def test_what_has_no_name_gets_none() -> None:
 def test_what_only_comes_near_is_told_as_an_approximation() -> None:
     found = outcome(40, seed=13)  # a spring that hardens
     assert [p["kind"] for p in found.planted] == ["outside:hardening_spring"]
-    assert "spring" in {each["kind"] for each in found.found}
-    for each in found.found:  # a wave beside the line comes nearer still, and is no better a name
-        assert each["verdict"] == "approximation"
+    assert "spring" in {each["kind"] for each in found.named}
+    for each in found.named:  # a wave beside the line comes nearer still, and is no better a name
+        assert each["judged"] == "approximation"
         assert each["approximates"] == "a function of q[panda_joint4]"
 
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from benchmarks.slsqp import BestAdmissible, ScipySlsqp
 from excite_cli.config.load import parse_spec
 from excite_cli.constraints.base import Array
 from excite_cli.excitation.correction import (
@@ -27,6 +26,7 @@ from excite_cli.excitation.solvers.interior_point import InteriorPoint, damped_u
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import clear_posture, random_start
 from excite_cli.excitation.task import MotionTask
+from tests.excitation.slsqp import BestAdmissible, ScipySlsqp
 from tests.excitation.smoke import task_of
 
 MAKERS: dict[str, Callable[[], Solver]] = {

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.coal_gradients import CoalGradients
+from benchmarks.clearance import CoalGradients
 from excite_cli.constraints.self_collision import Clearance
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.geometry.collision_pairs import CollisionPairs

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks.trust.fuzz_trial import Fuzzer, Verdict, attempt
+from benchmarks.trust.trial import Fuzzer, Verdict, attempt
 
 # Bytes that a refusal may take at its peak beyond what this process, with whatever was run in it
 # before, holds already.

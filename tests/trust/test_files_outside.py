@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.trust.fuzz_meshes import VALID
+from benchmarks.trust.robot_files import VALID
 from excite_cli.errors import RobotError
 from excite_cli.proposal.propose import Request, propose
 from excite_cli.robot.allowed_files import OutsideError, needed, own_folder

@@ -14,8 +14,7 @@ import h5py
 import numpy as np
 import pytest
 
-from benchmarks.trust.fuzz_bags import BagFuzzer
-from benchmarks.trust.fuzz_recordings import JOINTS, recorded
+from benchmarks.trust.data_files import JOINTS, BagFuzzer, recorded
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import FileError
 from excite_cli.measurement import reader

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from benchmarks.trust.fuzz_meshes import VALID, binary_stl
+from benchmarks.trust.robot_files import VALID, binary_stl
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import RobotError
 from excite_cli.geometry.link_meshes import link_meshes

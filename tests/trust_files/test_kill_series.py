@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.trust.kill_commands import Command
-from benchmarks.trust.kill_start import Start
-from benchmarks.trust.kill_trial import Series, Tally, undisturbed
+from benchmarks.trust.killing import Series, Start, Tally, undisturbed
 from excite_cli.atomic import write_atomically
 
 Killed = Callable[[Callable[[], None]], Tally]

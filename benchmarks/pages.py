@@ -1,6 +1,8 @@
-"""The part of a page that a benchmark writes: it stands between two marks."""
+"""What benchmarks write into pages: tables of Markdown, percentages, parts between two marks."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite
 
 
 @dataclass(frozen=True)
@@ -33,3 +35,17 @@ class MarkedPart:
         if not found:
             raise ValueError(f"the page lacks {self.begin} … {self.end}")
         return f"{before}{self.begin}\n{content}\n{self.end}{after}"
+
+
+def table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    """Markdown; columns whose head ends with a colon are right-aligned."""
+    bars = ["---:" if head.endswith(":") else "---" for head in heads]
+    lines = [[head.removesuffix(":") for head in heads], bars, *rows]
+    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)
+
+
+def percent(value: float) -> str:
+    """`12 %`, `8.8 %`, `–` where there is none."""
+    if not isfinite(value):
+        return "–"
+    return f"{100 * value:.0f} %" if value >= 0.0995 else f"{100 * value:.1f} %"

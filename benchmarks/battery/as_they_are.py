@@ -7,19 +7,92 @@ steps, noise with a memory, held samples, late torques, offsets. A fifth is clea
 Coulomb friction, offset and armature. The others have friction curves that are not in the
 catalogue (`friction`), and two fifths of these a single large effect more, or several small ones
 on all joints. A case follows from (seed, index) alone.
+
+LuGre (Canudas de Wit et al. 1995): ż = v − σ₀ |v| z / g(v), F = σ₀ z + σ₁ ż, with
+g(v) = F_c + (F_s − F_c) exp(−(v / v_s)²). GMS (Al-Bender et al. 2005), without its slow drift in
+slip: four Maxwell elements of stiffness k and least force α g(v). Both plus a viscous curve
+F_v |v|^p sign(v) of its own in each direction.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.as_they_are.friction import Curve
-from excite_cli.api.loading import Case as Robotic
+from benchmarks.battery import scoring
+from benchmarks.battery.cases import Case
+from benchmarks.battery.motions import Arm
 from excite_cli.api.loading import load_case
+from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION
+from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.build import true_inertias
 from excite_cli.simulation.mujoco_model import Plant, build_plant, load_mujoco
+from excite_cli.simulation.settings import SimulationSettings
+
+_ELEMENTS = 4
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Friction of n joints, each (n,): N·m, rad, rad/s.
+
+    `bristle`: how far [rad] a joint moves before it slips. `backward`: what all is multiplied by
+    where the speed is negative. `rough` has no memory at all where it is 0.
+    """
+
+    coulomb: Array
+    breakaway: Array
+    stribeck: Array
+    viscous: Array
+    power: Array
+    bristle: Array
+    backward: Array
+    by_load: Array
+    memory: str
+
+    def torque(self, t: Array, v: Array, load: Array, warmth: Array) -> Array:
+        """Friction (T, n) along speeds v (T, n) at equal steps; `warmth` (T,) scales the viscous.
+
+        `load` (T, n): torque that the gear carries.
+        """
+        height = self.coulomb + (self.breakaway - self.coulomb) * np.exp(
+            -np.square(v / self.stribeck)
+        )
+        height = (height + self.by_load * np.abs(load)) * np.where(v < 0, self.backward, 1.0)
+        slipping = self.viscous * np.abs(v) ** self.power * np.sign(v)
+        slipping = slipping * warmth[:, None] * np.where(v < 0, self.backward, 1.0)
+        if self.memory == "none":
+            return np.asarray(slipping + height * np.tanh(v / (0.02 * self.stribeck + 1e-6)))
+        step = float(t[1] - t[0])
+        if self.memory == "lugre":
+            return np.asarray(slipping + self._lugre(step, v, height))
+        return np.asarray(slipping + self._maxwell(step, v, height))
+
+    def _lugre(self, step: float, v: Array, height: Array) -> Array:
+        stiffness = self.coulomb / self.bristle
+        z, found = np.zeros(v.shape[1]), np.empty_like(v)
+        damping = 0.02 * np.sqrt(stiffness)
+        rate = stiffness * np.abs(v) / height
+        decay = np.exp(-rate * step)
+        slip = np.where(rate * step > 1e-9, -np.expm1(-rate * step) / (rate + 1e-300), step)
+        for k in range(len(v)):
+            new = decay[k] * z + slip[k] * v[k]
+            found[k] = stiffness * new + damping * (new - z) / step
+            z = new
+        return found
+
+    def _maxwell(self, step: float, v: Array, height: Array) -> Array:
+        shares = np.arange(1, _ELEMENTS + 1)
+        shares = shares / shares.sum()
+        stiffness = self.coulomb / self.bristle / _ELEMENTS
+        force, found = np.zeros((_ELEMENTS, v.shape[1])), np.empty_like(v)
+        for k in range(len(v)):
+            most = shares[:, None] * height[k]
+            force = np.clip(force + stiffness * v[k] * step, -most, most)
+            found[k] = force.sum(axis=0)
+        return found
+
 
 DATA = Path(__file__).parents[2] / "data"
 ROBOTS = (
@@ -32,30 +105,6 @@ _STEP = 1e-3  # s, of the simulated motion
 _RATES = (10, 25, 50, 100, 125, 250, 500)
 _RATE_SHARES = (0.05, 0.10, 0.15, 0.20, 0.20, 0.15, 0.15)
 _MOTIONS = ("series", "poses", "sines", "creeping")
-
-
-@dataclass(frozen=True)
-class Recording:
-    """t (T,), q and tau (T, n)."""
-
-    t: Array
-    q: Array
-    tau: Array
-
-
-@dataclass(frozen=True)
-class Case:
-    """What is given to the program, and what is in the data beyond the textbook's model.
-
-    `planted`: kinds that may be named, besides the textbook's on every joint.
-    """
-
-    index: int
-    label: str
-    robot: Robotic
-    recordings: tuple[Recording, ...]
-    more: bool
-    planted: tuple[str, ...] = field(default=())
 
 
 def make_case(seed: int, index: int) -> Case:
@@ -83,9 +132,15 @@ def make_case(seed: int, index: int) -> Case:
     torques, planted = (made.clean(), []) if clean else made.dirty()
     logs, late = _recorded(runs, torques, rate, rng, robot)
     planted += ["torque_delay"] * int(late)
-    words = [name.split(":")[-1].split("/")[0], "clean" if clean else made.memory]
-    words += [f"{count} x {style if weak else 'lively'}", f"{rate} Hz", *made.words]
-    return Case(index, ", ".join(words), given, tuple(logs), not clean, tuple(planted))
+    words = [f"{count} x {style if weak else 'lively'}", f"{rate} Hz", *made.words]
+    of = Arm(name.split(":")[-1].split("/")[0], robot, given.base, given.spec)
+    # What may be named on any joint, and nobody asks for.
+    may = dict.fromkeys((*EVERYDAY_FRICTION, *EVERYDAY, *planted))
+    plants = tuple(scoring.Plant((kind,), (), anywhere=True, required=False) for kind in may)
+    return Case(
+        index, "clean" if clean else made.memory, of, (), SimulationSettings(), given.spec, plants,
+        "declared", data=Dataset(robot.joint_names, tuple(logs)), words=", ".join(words),
+    )  # fmt: skip
 
 
 class _Made:
@@ -275,7 +330,7 @@ def _inverse(plant: Plant, q: Array, v: Array, a: Array) -> Array:
 
 def _recorded(
     runs: list, torques: list[Array], rate: int, rng: np.random.Generator, robot: Robot
-) -> tuple[list[Recording], bool]:
+) -> tuple[list[Run], bool]:
     """As a controller logs it: steps, noise, held and late torques (then True)."""
     step = 2 * np.pi / 2 ** rng.integers(14, 21)
     noise = np.exp(rng.uniform(np.log(0.005), np.log(0.05)))
@@ -296,5 +351,5 @@ def _recorded(
         noisy = torque + size * white
         if held > 1:
             noisy = noisy[(np.arange(len(at)) // held) * held]
-        found.append(Recording(at, np.round(read / step) * step, noisy))
+        found.append(Run(f"run_{len(found) + 1}", at, np.round(read / step) * step, noisy))
     return found, held > 1 or late > 0.0

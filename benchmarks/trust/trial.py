@@ -14,7 +14,7 @@ import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -62,18 +62,14 @@ class Verdict:
     made: str
     end: str
     text: str
-    seconds: float
-    cpu: float
-    memory: int
+    seconds: float = 0.0
+    cpu: float = 0.0
+    memory: int = 0
 
     @property
     def good(self) -> bool:
         """Whether it ended as it should."""
         return self.end in ("accepted", "refused")
-
-    def as_data(self) -> dict[str, Any]:
-        """For JSON."""
-        return asdict(self)
 
 
 class _OutOfTime(BaseException):
@@ -93,7 +89,8 @@ def generator(seed: int, fuzzer: Fuzzer, index: int) -> np.random.Generator:
 
 def attempt(fuzzer: Fuzzer, path: Path, index: int, made: str) -> Verdict:
     """Hand `path` to the parser and judge what comes of it."""
-    _forget_peak()
+    with contextlib.suppress(OSError):  # the kernel counts the peak anew, where it can
+        Path("/proc/self/clear_refs").write_text("5")
     before, cpu = time.monotonic(), time.process_time()
     end, text = _ended(fuzzer, path)
     seconds, cpu = time.monotonic() - before, time.process_time() - cpu
@@ -145,12 +142,6 @@ def _alarm(seconds: float) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, old)
-
-
-def _forget_peak() -> None:
-    """Let the kernel count the peak of this process's memory anew."""
-    with contextlib.suppress(OSError):  # then the peak is that of the whole process so far
-        Path("/proc/self/clear_refs").write_text("5")
 
 
 def _peak() -> int:

@@ -9,17 +9,15 @@ exactly.
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import ClassVar
 
 import numpy as np
 
+from benchmarks.battery.changes import Scene, shows
+from benchmarks.battery.outside import Thinning
+from benchmarks.battery.scoring import Plant
 from benchmarks.battery.sizes import Ground
-from benchmarks.campaigns.planting import Scene, shows
-from benchmarks.campaigns.plants import Plant
-from excite_cli.effects.base import Effect, Signals
+from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import kind_named
-from excite_cli.effects.parameter import Parameter
-from excite_cli.effects.sign import smooth_sign
 from excite_cli.robot.model import Array
 from excite_cli.simulation.covariate_series import CovariateSeries
 from excite_cli.simulation.ground_truth import Planted
@@ -31,25 +29,6 @@ _DECOYS = ("ambient", "humidity", "supply", "fan")
 _CHANGE = (0.3, 0.6)  # of the friction, over the column's range
 _OFFSET = (0.03, 0.12)  # of the joint's torque, over the column's range
 _THINNING = 0.3  # of the cases of friction
-
-
-class Thinning(Effect):
-    """Friction that thins: f (exp(−k δ) − 1) with δ = c − c₀, k = `rate`, f Coulomb and viscous."""
-
-    kind: ClassVar = "outside:thinning"
-    title: ClassVar = "friction that thins with a column"
-    signature: ClassVar = ""
-    parameters: ClassVar = (
-        Parameter("coulomb", "N·m", 0.01, 300.0),
-        Parameter("viscous", "N·m·s/rad", 0.01, 300.0),
-    )
-
-    def columns(self, signals: Signals) -> Array:
-        """(T, 1, 2)."""
-        deviation = signals.covariates[self.covariate] - self.shape["reference"]
-        thinner = np.expm1(-self.shape["rate"] * deviation)
-        v = signals.v[:, self.joints[0]]
-        return (thinner[:, None] * np.stack([smooth_sign(v), v], axis=-1))[:, None]
 
 
 def pause_of(motions: Sequence[Planned]) -> float:

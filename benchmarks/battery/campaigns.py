@@ -5,55 +5,53 @@ the seed shuffles: 208 cases hold thirteen of each. From `FIRST_WITH_COLUMNS` on
 further columns, their groups in turn.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
 
-from benchmarks.battery.cases import model_columns
-from benchmarks.battery.motions import Arm
-from benchmarks.battery.sizes import ground_of
-from benchmarks.campaigns import planting
-from benchmarks.campaigns.columns import (
+from benchmarks.battery import changes
+from benchmarks.battery.cases import Case, model_columns
+from benchmarks.battery.changes import Draw, Scene
+from benchmarks.battery.columns import (
     drawn_series,
     friction_by_column,
     offset_by_column,
     pause_of,
     with_columns,
 )
-from benchmarks.campaigns.instruments import Instruments
-from benchmarks.campaigns.mechanisms import MovedCenters
-from benchmarks.campaigns.motions import series, short_moves
-from benchmarks.campaigns.planting import Draw, Scene
-from benchmarks.campaigns.plants import FIRST_ORDER, Plant
-from benchmarks.campaigns.robots import drawn_robot, robot_of
+from benchmarks.battery.instruments import Instruments
+from benchmarks.battery.motions import Arm
+from benchmarks.battery.outside import MovedCenters
+from benchmarks.battery.scoring import FIRST_ORDER, Plant
+from benchmarks.battery.series import drawn_robot, robot_of, series, short_moves
+from benchmarks.battery.sizes import ground_of
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.spec import Spec
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.simulation.build import true_inertias
 from excite_cli.simulation.ground_truth import Planted, sized
-from excite_cli.simulation.planned_motion import Planned
 from excite_cli.simulation.settings import SimulationSettings
 
 _CLEAN_DECK = ("clean_white", "clean_colored", "clean_centers")
 CLEAN = (*_CLEAN_DECK, "clean_columns")
 _CHANGES: dict[str, Draw] = {
-    "payload": planting.payload,
-    "payload_on_leaf": planting.payload_on_leaf,
-    "friction_trend": planting.friction_trend,
-    "friction_step": planting.friction_step,
-    "friction_once": planting.friction_once,
-    "offset_change": planting.offset_change,
-    "gain_change": planting.gain_change,
-    "contact": planting.contact,
-    "unknown_map": planting.unknown_map,
+    "payload": changes.payload,
+    "payload_on_leaf": changes.payload_on_leaf,
+    "friction_trend": changes.friction_trend,
+    "friction_step": changes.friction_step,
+    "friction_once": changes.friction_once,
+    "offset_change": changes.offset_change,
+    "gain_change": changes.gain_change,
+    "contact": changes.contact,
+    "unknown_map": changes.unknown_map,
 }
 GROUPS = (*_CHANGES, "short_moves", "stale_packets", "one_training_run", "several", *_CLEAN_DECK)
 _BY_COLUMN: dict[str, Draw] = {
     "friction_by_column": friction_by_column,
     "offset_by_column": offset_by_column,
-    "friction_trend_beside_columns": planting.friction_trend,
+    "friction_trend_beside_columns": changes.friction_trend,
 }
 WITH_COLUMNS = (*_BY_COLUMN, "clean_columns")
 FIRST_WITH_COLUMNS = 10_000
@@ -72,44 +70,14 @@ _SIMPLE = (
 )
 _ALL_RUNS = (*_SIMPLE, "stribeck_friction", *FIRST_ORDER)
 _IN_RUNS: tuple[Draw, ...] = (
-    planting.payload,
-    planting.offset_change,
-    planting.friction_step,
-    planting.gain_change,
+    changes.payload,
+    changes.offset_change,
+    changes.friction_step,
+    changes.gain_change,
 )
 _FRICTION = (EffectSpec(kind="viscous_friction"), EffectSpec(kind="coulomb_friction"))
 _MOVED = (0.02, 0.035)  # m by which a centre of mass may be off
 _ATTEMPTS = 80
-
-
-@dataclass(frozen=True)
-class Case:
-    """All that simulating, recording and diagnosing need; `spec` holds the declared model.
-
-    `plants` is everything that is in the robot and not declared. `friction`: plain friction is
-    "declared", "undeclared" (in the robot, to be found) or "none".
-    """
-
-    index: int
-    group: str
-    robot: Arm
-    motions: tuple[Planned, ...]
-    settings: SimulationSettings
-    instruments: Instruments
-    spec: Spec
-    plants: tuple[Plant, ...]
-    hidden: tuple[Planted, ...]
-    held_out: str
-    friction: str
-
-    @property
-    def runs(self) -> tuple[str, ...]:
-        return tuple(motion.name for motion in self.motions)
-
-    @property
-    def planted(self) -> tuple[Planted, ...]:
-        """What the simulated robot has beside what is declared."""
-        return (*(p for plant in self.plants for p in plant.effects), *self.hidden)
 
 
 def group_of(seed: int, index: int) -> str:
@@ -173,8 +141,8 @@ def _attempt(index: int, group: str, rng: np.random.Generator) -> Case | None:
     hidden = (_moved(of, rng),) if group == "clean_centers" else ()
     spec = _with_states(spec, changes, held_out, rng)
     return Case(
-        index, group, of, motions, settings, instruments, spec, (*changes, *background), hidden,
-        held_out, friction,
+        index, group, of, motions, settings, spec, (*changes, *background), friction,
+        instruments=instruments, hidden=hidden, held_out=held_out,
     )  # fmt: skip
 
 
@@ -264,25 +232,25 @@ def _plants(
         return _several(scene, friction, rng)
     if group == "short_moves" and rng.uniform() < 0.5:
         return ()
-    pool: list[Draw] = [partial(planting.of_catalogue, kind) for kind in _ALL_RUNS]
+    pool: list[Draw] = [partial(changes.of_catalogue, kind) for kind in _ALL_RUNS]
     if group != "one_training_run":
-        pool = [partial(planting.of_catalogue, kind) for kind in _SIMPLE] + [planting.payload] * 2
+        pool = [partial(changes.of_catalogue, kind) for kind in _SIMPLE] + [changes.payload] * 2
     found = pool[rng.integers(len(pool))](scene, rng)
     return None if found is None else (found,)
 
 
 def _several(scene: Scene, friction: str, rng: np.random.Generator) -> tuple[Plant, ...] | None:
     """Two to four effects of different kinds that can be told apart."""
-    in_runs = [draw for draw in _IN_RUNS if friction != "none" or draw != planting.friction_step]
-    pool: list[Draw] = [partial(planting.of_catalogue, kind) for kind in _SIMPLE]
+    in_runs = [draw for draw in _IN_RUNS if friction != "none" or draw != changes.friction_step]
+    pool: list[Draw] = [partial(changes.of_catalogue, kind) for kind in _SIMPLE]
     pool += in_runs
     found: list[Plant] = []
     wanted = int(rng.integers(2, 5))
     for at in rng.permutation(len(pool)):
-        around = planting.beside(scene, found)
+        around = changes.beside(scene, found)
         plant = pool[at](around, rng)
         kinds = {kind for each in found for kind in each.kinds}
-        if plant is None or kinds & set(plant.kinds) or not planting.separate(around, plant):
+        if plant is None or kinds & set(plant.kinds) or not changes.separate(around, plant):
             continue
         found.append(plant)
         if len(found) == wanted:

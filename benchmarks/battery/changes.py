@@ -11,10 +11,10 @@ import numpy as np
 
 from benchmarks.battery.cases import left_over, one_effect, weighted_columns
 from benchmarks.battery.motions import Arm
+from benchmarks.battery.outside import MAPS, Carried, DirectionMap, map_shape, solid
+from benchmarks.battery.scoring import Name, Plant
+from benchmarks.battery.series import leaves
 from benchmarks.battery.sizes import Ground, Sized, ratios
-from benchmarks.campaigns.mechanisms import MAPS, Carried, DirectionMap, map_shape, solid
-from benchmarks.campaigns.plants import Plant
-from benchmarks.campaigns.robots import leaves
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.robot.model import Array
@@ -209,9 +209,14 @@ def as_plant(scene: Scene, found: Sized) -> Plant:
     reported = effect.report(values, np.zeros((len(values), len(values))))
     own = (*reported.items(),)
     sizes = {name: value.value for name, value in own if name not in effect.shape}
-    effects = (planted, *found.companions)
+    companions = tuple(Name(p.effect.kind, scene.names(p.effect.joints)) for p in found.companions)
     return Plant(
-        (effect.kind,), scene.names(effect.joints), effects, frozenset(effect.runs), sizes=sizes
+        (effect.kind,),
+        scene.names(effect.joints),
+        (planted, *found.companions),
+        frozenset(effect.runs),
+        sizes=sizes,
+        companions=companions,
     )
 
 

@@ -1,22 +1,85 @@
-"""Motions of a campaign: Fourier series of 4–10 s, or short moves with rests between them.
+"""Robots of campaigns, and their motions: Fourier series of 4–10 s, or short moves with rests.
 
 Several series are drawn for a run and the best conditioned one is taken, so that parameters are
 known about as well as from planned motions. Short moves are those that people record: from point to
 point in 0.5–2 s with rests, and in each move some of the joints stand.
 """
 
-import numpy as np
+from functools import cache
+from typing import Any
 
-from benchmarks.battery.motions import Arm
-from benchmarks.campaigns.robots import joint_limits
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.battery.motions import CONFIGS, HARMONICS, Arm, waves
+from excite_cli.config.load import load_spec
+from excite_cli.config.spec import Spec
+from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.regressor import Regressor
-from excite_cli.robot.model import Array
+from excite_cli.robot.model import Array, Robot, build_robot
+from excite_cli.robot.tree import tree_of
 from excite_cli.simulation.planned_motion import Planned, PlannedMotion, PlannedProgram
 from excite_cli.trajectory.fade import Chain, Segment
 from excite_cli.trajectory.fourier import FourierTrajectory
 from excite_cli.trajectory.point_to_point import PointToPoint, at_rest_between
 
-_HARMONICS = 5
+ROBOTS = ("smoke", "ur10", "panda", "z1", "xarm7", "two_arms")
+TWO_LEAVES = ("two_arms",)
+_SHARES = (0.25, 0.25, 0.15, 0.15, 0.1, 0.1)
+
+_SHIPPED = ("smoke", "ur10", "panda")
+_OF_EXAMPLES: dict[str, dict[str, Any]] = {
+    "z1": {
+        "urdf": "example-robot-data:z1",
+        "joints": [f"joint{k}" for k in range(1, 7)],
+        "posture": {"joint2": 1.2, "joint3": -1.2},
+    },
+    "xarm7": {"urdf": "example-robot-data:xarm7", "posture": {"joint2": -0.5, "joint4": 0.9}},
+    "two_arms": {
+        "urdf": "example-robot-data:talos",
+        "joints": [f"arm_{side}_{k}_joint" for side in ("left", "right") for k in (2, 3, 4)],
+        "posture": {
+            "arm_left_1_joint": 0.25847,
+            "arm_left_2_joint": 0.4,
+            "arm_left_4_joint": -0.525366,
+            "arm_right_1_joint": -0.25847,
+            "arm_right_2_joint": -0.4,
+            "arm_right_4_joint": -0.525366,
+        },
+    },
+}
+
+
+def drawn_robot(rng: np.random.Generator, two_leaves: bool) -> str:
+    """Name of a robot, of one with two leaves if that is asked for."""
+    if two_leaves:
+        return str(rng.choice(TWO_LEAVES))
+    return str(rng.choice(ROBOTS, p=_SHARES))
+
+
+@cache
+def robot_of(name: str) -> Arm:
+    """A robot with its base parameters and its configuration."""
+    if name in _SHIPPED:
+        spec = load_spec(CONFIGS / f"{name}.yaml", [])
+    else:
+        spec = Spec.model_validate({"robot": _OF_EXAMPLES[name]})
+    robot = build_robot(spec.robot, CONFIGS)
+    return Arm(name, robot, find_base_parameters(robot), spec)
+
+
+def leaves(robot: Robot) -> tuple[int, ...]:
+    """Moved joints that carry no other one, the last of them last."""
+    parents = {joint.parent for joint in tree_of(robot).joints}
+    return tuple(j for j in range(robot.n) if j not in parents)
+
+
+def joint_limits(robot: Robot) -> tuple[NDArray, NDArray, NDArray]:
+    """Lower and upper positions (n,) within ±π, and speeds (n,) that a person would allow."""
+    lower, upper = (np.clip(x, -np.pi, np.pi) for x in robot.limits.ranges())
+    return lower, upper, np.minimum(robot.limits.velocity, 3.0)
+
+
 _ACCELERATION = 8.0  # rad/s²
 _DRAWS = 6
 _GRID = 60
@@ -35,8 +98,9 @@ def series(of: Arm, names: tuple[str, ...], rng: np.random.Generator) -> tuple[P
             again = found[rng.integers(len(found))]
             found.append(PlannedMotion(name, again.trajectory, again.coefficients))
             continue
-        trajectory = FourierTrajectory(_HARMONICS, 2 * np.pi / (seconds * rng.uniform(1.0, 1.2)))
-        drawn = [_waves(of, trajectory, rng) for _ in range(_DRAWS)]
+        trajectory = FourierTrajectory(HARMONICS, 2 * np.pi / (seconds * rng.uniform(1.0, 1.2)))
+        fastest = joint_limits(of.robot)[2]
+        drawn = [waves(of, trajectory, 300, fastest, _ACCELERATION, rng) for _ in range(_DRAWS)]
         best = min(drawn, key=lambda each: _condition(of, trajectory, each))
         found.append(PlannedMotion(name, trajectory, best))
     return tuple(found)
@@ -52,24 +116,6 @@ def _condition(of: Arm, trajectory: FourierTrajectory, coefficients: Array) -> f
     states = trajectory.basis(times).states(coefficients)
     y = Regressor(of.robot).evaluate(*states)[:, :, of.base.selection].reshape(-1, of.base.rank)
     return float(np.linalg.cond(y / np.maximum(np.linalg.norm(y, axis=0), 1e-12)))
-
-
-def _waves(of: Arm, trajectory: FourierTrajectory, rng: np.random.Generator) -> Array:
-    """Random series about a random centre, every joint scaled to its own limits."""
-    n = of.robot.n
-    lower, upper, fastest = joint_limits(of.robot)
-    falling = np.arange(1, _HARMONICS + 1) ** -rng.uniform(0.3, 1.3)
-    shape = np.vstack(
-        [rng.normal(size=(2 * _HARMONICS, n)) * np.tile(falling, 2)[:, None], np.zeros((1, n))]
-    )
-    q, v, a = trajectory.basis(np.arange(300) * trajectory.duration / 300).states(shape)
-    highest, lowest = q.max(axis=0), q.min(axis=0)
-    room = (upper - lower) / np.maximum(highest - lowest, 1e-12)
-    speed, push = fastest / np.abs(v).max(axis=0), _ACCELERATION / np.abs(a).max(axis=0)
-    scale = np.min([room, speed, push], axis=0) * rng.uniform(0.6, 0.9, n)
-    shape *= scale
-    shape[-1] = rng.uniform(lower - scale * lowest, upper - scale * highest)
-    return shape
 
 
 def _moves(of: Arm, rng: np.random.Generator) -> Chain:

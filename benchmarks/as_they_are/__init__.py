@@ -1,1 +1,0 @@
-"""Robots as they are: geared arms with few and plain recordings, and what is said of them."""

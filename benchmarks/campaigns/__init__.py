@@ -1,1 +1,0 @@
-"""Parts of the battery of campaigns: robots, motions, instruments, changes, judging, tables."""
