@@ -20,11 +20,13 @@ from excite_cli.errors import ConfigError, ExciteWarning
 from excite_cli.identification.least_squares import EXACT
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.processing import DEFAULT_MOVING
+from excite_cli.measurement.dataset import Mask
 from excite_cli.out_of_core import Spool
 from excite_cli.robot.model import Array, Robot
 from excite_cli.workers.base import Tell
 from excite_cli.workers.context import each
 
+_ROUNDING = 1e-11  # of the largest column of an effect, each with its usual size: no column
 _TOGETHER = 16  # effects that are filtered at once: their columns take little memory
 
 
@@ -221,19 +223,21 @@ def with_columns(
 ) -> list[Candidate]:
     """Candidates with their filtered columns; those that are zero everywhere are left out.
 
-    So are those that are rounding: a zero of the first axis, which gravity does not see, was given
-    1e11 rad of an upright robot, and with it the whole search hung on the processor.
+    So are those that are rounding (single columns become zero): a zero of the first axis, which
+    gravity does not see, was given 1e11 rad of an upright robot, and with it the whole search hung
+    on the processor.
     """
     n = signals[0].q.shape[1]
     alike: dict[tuple[int, ...], list[int]] = {}
     for i, (effect, _) in enumerate(effects):
         alike.setdefault(effect.rows(n), []).append(i)
     columns: list[list[Array]] = [[] for _ in effects]
-    spool, sizes = Spool(), np.zeros(len(effects))
+    spool = Spool()
+    sizes = [np.zeros(len(effect.parameters)) for effect, _ in effects]
     shared = [effect for effect, _ in effects], alike
     of_runs = each(_of_run, shared, zip(signals, runs, strict=True))
     for run, (blocks, largest) in zip(runs, of_runs, strict=True):
-        sizes += largest
+        sizes = [size + own for size, own in zip(sizes, largest, strict=True)]
         for (effect, _), own, block in zip(effects, columns, blocks, strict=True):
             if block is None:
                 shape = run.averages.shape[0], len(effect.rows(n)), len(effect.parameters)
@@ -241,25 +245,38 @@ def with_columns(
             own.append(spool.keep(block))
     dust = EXACT * max(float(np.abs(run.tau_fit).max(initial=0.0)) for run in runs)
     return [
-        Candidate(effect, effect.rows(n), tuple(blocks), tests)
+        Candidate(
+            effect,
+            effect.rows(n),
+            _without_dust(blocks, size > max(dust, _ROUNDING * size.max())),
+            tests,
+        )
         for (effect, tests), blocks, size in zip(effects, columns, sizes, strict=True)
-        if dust < size < np.inf
+        if dust < size.max() < np.inf
     ]
+
+
+def _without_dust(blocks: Sequence[Array], shown: Mask) -> tuple[Array, ...]:
+    """Columns of which no more than rounding `shown` (p,) are zero.
+
+    A force along the axis of every joint was given 3e14 N of a planar arm.
+    """
+    return tuple(blocks if shown.all() else (np.where(shown, block, 0.0) for block in blocks))
 
 
 def _of_run(
     shared: tuple[Sequence[Effect], dict[tuple[int, ...], list[int]]],
     task: tuple[Signals, PreparedRun],
     tell: Tell,
-) -> tuple[list[Array | None], Array]:
-    """Columns of all effects in one run, None of those that are not in it, and the largest torque.
+) -> tuple[list[Array | None], list[Array]]:
+    """Columns of all effects in one run, None of those that are not in it; largest torques (p,).
 
     Effects on the same rows are filtered together: `alike` are their indices, by rows.
     """
     effects, alike = shared
     signals, run = task
     columns: list[Array | None] = [None for _ in effects]
-    largest = np.zeros(len(effects))
+    largest = [np.zeros(len(effect.parameters)) for effect in effects]
     for rows, members in alike.items():
         present = [i for i in members if effects[i].active(signals.run)]
         for start in range(0, len(present), _TOGETHER):
@@ -270,7 +287,7 @@ def _of_run(
             for i, block in zip(some, np.split(filtered, ends[:-1], axis=2), strict=True):
                 columns[i] = block.copy()
                 usual = [parameter.high for parameter in effects[i].parameters]
-                largest[i] = np.abs(block * usual).max(initial=0.0)
+                largest[i] = np.abs(block * usual).max(axis=(0, 1), initial=0.0)
     signals.body.forget()
     return columns, largest
 

@@ -108,6 +108,8 @@ class WeightedFit:
         halves = np.sqrt(values[there])
         # of P x = h: rows are the half of P, and what they say is the rest of h
         said = vectors[:, there].T @ (gram[:-1, -1] / norms) / halves
+        # What the data do not have at all, no rounding of an imagined motion tells.
+        norms[np.diag(self._evidence.total)[columns] == 0.0] = 0.0
         return halves[:, None] * vectors[:, there].T * norms, said
 
     def _imagined(self, chosen: Sequence[int], held: Array) -> Array:

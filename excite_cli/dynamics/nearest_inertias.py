@@ -16,6 +16,7 @@ from scipy.sparse import csc_matrix, eye
 from excite_cli.dynamics.pseudo_inertia import scaled_basis, smallest_eigenvalues
 from excite_cli.robot.model import Array
 
+_FREE = 100.0  # kg, or times the mass of a body: what is as uncertain is free
 _ROOT2 = float(np.sqrt(2.0))
 
 
@@ -45,6 +46,7 @@ def nearest_inertias(
     bodies = len(lengths)
     if not _broken(start, lengths, signs, margin):
         return Nearest(start, 0.0, "no constraint is active", True)
+    back = _bounded(back, start, lengths)
     rows = [-_unit(back[signs])[0]]
     bounds = [start[signs] * _unit(back[signs])[1]]
     for b in range(bodies):
@@ -60,6 +62,22 @@ def nearest_inertias(
     if solved and eigenvalues.min() <= 0:
         status, solved = f"{status}, but a body is left with a negative eigenvalue", False
     return Nearest(x, float(w @ w), status, solved)
+
+
+def _bounded(back: Array, start: Array, lengths: Array) -> Array:
+    """`back` with no deviation beyond `_FREE` times the body, of which data say nothing anyway.
+
+    Where they are 1e16 times those that the data know, the solver breaks off: the payload of a
+    planar arm was not found for that.
+    """
+    found = back.copy()
+    for b, length in enumerate(lengths):
+        of_body = slice(10 * b, 10 * b + 10)
+        units = length ** np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
+        most = _FREE * max(1.0, float(np.abs(start[of_body] / units).max())) * units
+        spread = np.linalg.norm(back[of_body], axis=1)
+        found[of_body] *= np.minimum(1.0, most / np.maximum(spread, 1e-300))[:, None]
+    return found
 
 
 def half_of(covariance: Array) -> Array:
@@ -82,7 +100,14 @@ def _least_norm(rows: Array, bounds: Array, signs: int, bodies: int) -> tuple[Ar
     solver = clarabel.DefaultSolver(
         csc_matrix(eye(size)), np.zeros(size), csc_matrix(rows), bounds, cones, settings
     )
-    found = solver.solve()
+    try:
+        found = solver.solve()
+    except BaseException as error:
+        # A panic of the compiled solver is no `Exception`: what it could not factorise has no
+        # nearest body, which is for the caller to say, and not the end of the program.
+        if type(error).__name__ != "PanicException":
+            raise
+        return np.zeros(size), f"the solver broke off: {error}"
     return np.asarray(found.x), str(found.status)
 
 
