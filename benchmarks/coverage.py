@@ -27,7 +27,7 @@ from excite_cli.effects.catalogue import kind_named
 from excite_cli.identification.identify import identify
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.robot.model import Array
-from excite_cli.simulation.ground_truth import Planted, plant
+from excite_cli.simulation.ground_truth import PlantedEffect, plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 
@@ -82,7 +82,7 @@ def noisy(data: Dataset, made: Made, coarse: bool, rng: np.random.Generator) -> 
     return replace(data, runs=tuple(runs))
 
 
-def friction_of(joints: int, rng: np.random.Generator) -> list[Planted]:
+def friction_of(joints: int, rng: np.random.Generator) -> list[PlantedEffect]:
     """Viscous and Coulomb friction of every joint."""
     return [
         plant(kind_named(kind), (j,), float(rng.uniform(0.5, 5.0)))
@@ -91,7 +91,7 @@ def friction_of(joints: int, rng: np.random.Generator) -> list[Planted]:
     ]
 
 
-def payload_of(joint: int, mass: float, centre: Array, run: str) -> Planted:
+def payload_of(joint: int, mass: float, centre: Array, run: str) -> PlantedEffect:
     """A sphere on the joint's link in one run."""
     others = dict(zip(("cx", "cy", "cz"), map(float, centre), strict=True))
     one = plant(kind_named("payload"), (joint,), float(mass), others)

@@ -17,7 +17,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from benchmarks.problems import CONFIGS, BareCalls, interleaved, motion, problem
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.excitation.base_motion import base_motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.solvers.base import Effort

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg import lapack
 
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.start import random_direction
 from excite_cli.excitation.task import MotionTask

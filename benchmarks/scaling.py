@@ -27,7 +27,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from benchmarks.problems import problem
-from excite_cli.excitation.one_start import FoundMotion, Search
+from excite_cli.excitation.one_start import FoundMotion, StartContext
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.run import continue_run, new_result
@@ -124,7 +124,7 @@ def start_up(of: Problem) -> tuple[float, float, int]:
     """Seconds until a worker has done a first task, of one task more, bytes that it was sent."""
     from benchmarks.scaling import nothing  # workers import it by this name, not from __main__
 
-    shared = Search(of, InteriorPoint())
+    shared = StartContext(of, InteriorPoint())
     stack = np.zeros((of.columns, of.columns))
     began = time.perf_counter()
     with Processes(1) as workers:

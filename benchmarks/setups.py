@@ -34,7 +34,7 @@ from excite_cli.api.diagnosing import diagnose
 from excite_cli.api.identifying import identify
 from excite_cli.api.inspecting import inspect
 from excite_cli.api.loading import Case, load_case
-from excite_cli.checks.result import Result
+from excite_cli.checks.check_result import CheckResult
 from excite_cli.config.commented_yaml import with_values
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION
@@ -152,7 +152,7 @@ def _usual(case: Case, data: Dataset) -> tuple[frozenset[str], float]:
         return frozenset(_doubted(found.results)), _error(_case(case, {}), file)
 
 
-def _doubted(results: tuple[Result, ...]) -> list[str]:
+def _doubted(results: tuple[CheckResult, ...]) -> list[str]:
     return [each.name for each in results if each.status != "ok"]
 
 
@@ -267,7 +267,7 @@ def sound(count: int, seed: int) -> None:
                 true = TRUE | ({"mount"} if each.leans else set())
                 said = [e for e in found.results if e.status != "ok" and e.kind not in true]
             except ExciteError as refused:
-                said = [Result("refused", "", "fault", str(refused))]
+                said = [CheckResult("refused", "", "fault", str(refused))]
         logs += 1
         words.update(e.status for e in said[:1])
         print(

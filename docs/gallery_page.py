@@ -158,7 +158,7 @@ def left_of(found: Diagnosis) -> dict[str, str]:
     for joint in found.joint_names:
         only = replace(
             found,
-            large_rests=tuple(each for each in found.large_rests if each.joint == joint),
+            excess_residuals=tuple(each for each in found.excess_residuals if each.joint == joint),
         )
         rests = [text for texts in rests_in_words(only) for text in texts]
         stands: dict[str, list[str]] = {}

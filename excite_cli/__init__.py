@@ -68,15 +68,15 @@ if TYPE_CHECKING:
     from excite_cli.errors import MissingExtraError as MissingExtraError
     from excite_cli.errors import NoAdmissibleMotionError as NoAdmissibleMotionError
     from excite_cli.errors import RobotError as RobotError
-    from excite_cli.excitation.comparison import Comparison as Comparison
     from excite_cli.excitation.inspection import Inspection as Inspection
     from excite_cli.excitation.inspection import Inspections as Inspections
     from excite_cli.excitation.motion import Motion as Motion
     from excite_cli.excitation.problem import Problem as Problem
+    from excite_cli.excitation.random_comparison import Comparison as Comparison
     from excite_cli.excitation.result import Result as Result
+    from excite_cli.identification.carried_load import LoadIdentification as LoadIdentification
     from excite_cli.identification.fit import Fit as Fit
     from excite_cli.identification.identify import Identification as Identification
-    from excite_cli.identification.load import LoadIdentification as LoadIdentification
     from excite_cli.measurement.dataset import Dataset as Dataset
     from excite_cli.measurement.dataset import Run as Run
     from excite_cli.proposal.propose import Proposal as Proposal
@@ -146,7 +146,7 @@ _HOMES = {
     "excitation.result": ("Result",),
     "identification.fit": ("Fit",),
     "identification.identify": ("Identification",),
-    "identification.load": ("LoadIdentification",),
+    "identification.carried_load": ("LoadIdentification",),
     "measurement.dataset": ("Dataset", "Run"),
     "proposal.propose": ("Proposal",),
     "scoring.changes": ("Change", "Changes"),

@@ -54,7 +54,7 @@ class _File:
 
 
 @dataclass(frozen=True)
-class Reference:
+class ArrayLocation:
     """Where an array lies: `at` bytes into a mapped `part` (offset, size) of a file.
 
     That is the file `descriptor` of the process `process`, with `file` as device and inode, for
@@ -168,14 +168,14 @@ def forget() -> None:
             each.madvise(mmap.MADV_DONTNEED)
 
 
-def reference_to(values: NDArray) -> Reference | None:
+def reference_to(values: NDArray) -> ArrayLocation | None:
     """Where in a file of this process an array lies, also a part of one; None if it does not."""
     part = _part_of(values)
     if part is None or not values.size or min(values.strides, default=0) < 0:
         return None
     file, offset = _mapped[part]
     start = np.frombuffer(part, np.uint8, 1).ctypes.data
-    return Reference(
+    return ArrayLocation(
         os.getpid(),
         file.descriptor,
         file.key,
@@ -187,7 +187,7 @@ def reference_to(values: NDArray) -> Reference | None:
     )
 
 
-def attached(reference: Reference) -> NDArray:
+def attached(reference: ArrayLocation) -> NDArray:
     """The array in another process's file, to be read only, whatever becomes of that process.
 
     Raises

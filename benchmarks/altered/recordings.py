@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.battery.series import robot_of, series, short_moves
 from excite_cli.api.loading import Case
 from excite_cli.config.data_spec import EffectSpec
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.effects.catalogue import declared_effects, kind_named
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Dataset

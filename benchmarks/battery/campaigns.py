@@ -31,7 +31,7 @@ from excite_cli.config.spec import Spec
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.simulation.build import true_inertias
-from excite_cli.simulation.ground_truth import Planted, sized
+from excite_cli.simulation.ground_truth import PlantedEffect, sized
 from excite_cli.simulation.settings import SimulationSettings
 
 _CLEAN_DECK = ("clean_white", "clean_colored", "clean_centers")
@@ -199,7 +199,7 @@ def _friction(group: str, rng: np.random.Generator) -> str:
     return str(rng.choice(["declared", "undeclared", "none"], p=[0.6, 0.2, 0.2]))
 
 
-def _sizes(of: Arm, inside: tuple[Planted, ...]) -> np.ndarray:
+def _sizes(of: Arm, inside: tuple[PlantedEffect, ...]) -> np.ndarray:
     sizes = np.zeros((2, of.robot.n))
     for planted in inside:
         row = int(planted.effect.kind == "viscous_friction")
@@ -207,14 +207,14 @@ def _sizes(of: Arm, inside: tuple[Planted, ...]) -> np.ndarray:
     return sizes
 
 
-def _background(scene: Scene, inside: tuple[Planted, ...]) -> tuple[Plant, ...]:
+def _background(scene: Scene, inside: tuple[PlantedEffect, ...]) -> tuple[Plant, ...]:
     """Friction that every robot has and this config does not declare."""
     found = []
     for planted in inside:
         effect: Effect = planted.effect
         name = effect.parameters[0].name
         sizes = {name: float(planted.values[0])}
-        free = Planted(effect, planted.values)
+        free = PlantedEffect(effect, planted.values)
         joints = scene.names(effect.joints)
         found.append(Plant((effect.kind,), joints, (free,), sizes=sizes, required=False))
     return tuple(found)
@@ -258,11 +258,11 @@ def _several(scene: Scene, friction: str, rng: np.random.Generator) -> tuple[Pla
     return None
 
 
-def _moved(of: Arm, rng: np.random.Generator) -> Planted:
+def _moved(of: Arm, rng: np.random.Generator) -> PlantedEffect:
     """Every centre of mass about 3 cm from where the URDF has it."""
     away = rng.normal(size=(of.robot.n, 3))
     away *= rng.uniform(*_MOVED, (of.robot.n, 1)) / np.linalg.norm(away, axis=1, keepdims=True)
-    return Planted(MovedCenters(tuple(range(of.robot.n))), away.ravel())
+    return PlantedEffect(MovedCenters(tuple(range(of.robot.n))), away.ravel())
 
 
 def _with_states(

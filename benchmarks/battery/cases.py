@@ -24,7 +24,7 @@ from excite_cli.effects.catalogue import catalogue, declared_effects, kind_named
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.build import true_inertias
-from excite_cli.simulation.ground_truth import Planted, sized
+from excite_cli.simulation.ground_truth import PlantedEffect, sized
 from excite_cli.simulation.planned_motion import Planned, PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
 
@@ -58,7 +58,7 @@ class Case:
     friction: str
     visible: tuple[float, ...] = ()
     instruments: Instruments | None = None
-    hidden: tuple[Planted, ...] = ()
+    hidden: tuple[PlantedEffect, ...] = ()
     held_out: str | None = None
     data: Dataset | None = None
     words: str = ""
@@ -68,7 +68,7 @@ class Case:
         return tuple(motion.name for motion in self.motions)
 
     @property
-    def planted(self) -> tuple[Planted, ...]:
+    def planted(self) -> tuple[PlantedEffect, ...]:
         """What the simulated robot has beside what is declared."""
         return (*(p for plant in self.plants for p in plant.effects), *self.hidden)
 
@@ -88,7 +88,7 @@ def sized_case(
 def plant_of(one: Sized, robot: Robot) -> Plant:
     """The effect as it is scored."""
 
-    def name(planted: Planted) -> Name:
+    def name(planted: PlantedEffect) -> Name:
         return Name(planted.effect.kind, tuple(robot.joint_names[j] for j in planted.effect.joints))
 
     own = name(one.planted)

@@ -18,7 +18,7 @@ from benchmarks.battery.sizes import Ground, Sized, ratios
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.robot.model import Array
-from excite_cli.simulation.ground_truth import Planted
+from excite_cli.simulation.ground_truth import PlantedEffect
 
 _SHOWS = 1.0  # RMS of what is left of an effect, in units of the noise's
 _SEPARATE = 0.05  # share that the declared model and the other effects leave
@@ -52,7 +52,7 @@ class Scene:
 Draw = Callable[[Scene, np.random.Generator], Plant | None]
 
 
-def shows(scene: Scene, planted: Sequence[Planted]) -> bool:
+def shows(scene: Scene, planted: Sequence[PlantedEffect]) -> bool:
     """Whether enough of it is left by the declared model."""
     torque = np.concatenate(
         [sum(p.effect.torque(s, p.values) for p in planted) for s in scene.ground.signals]
@@ -98,7 +98,7 @@ def payload(scene: Scene, rng: np.random.Generator, joint: int | None = None) ->
     center = np.array([*rng.uniform(-0.08, 0.08, 2), rng.uniform(0.0, 0.15)])
     values = solid(mass, center, rng)
     runs = some_runs(scene, rng)
-    planted = Planted(Carried((carrier,), {}, tuple(sorted(runs))), values)
+    planted = PlantedEffect(Carried((carrier,), {}, tuple(sorted(runs))), values)
     if not shows(scene, [planted]) or ratios(planted.effect, values, scene.ground).max() > 3.0:
         return None
     sizes = {"mass": values[0], "mx": values[1], "my": values[2], "mz": values[3]}
@@ -116,7 +116,7 @@ def friction_trend(scene: Scene, rng: np.random.Generator) -> Plant | None:
     which = ((True, False), (False, True), (True, True))[rng.integers(3)]
     extra = rng.uniform(*_STRONGER) * np.exp(-np.array(scene.clock) / rng.uniform(0.2, 1.0))
     planted = [
-        Planted(kind_named(kind)((j,), {}, (run,)), np.array([base[j] * stronger]))
+        PlantedEffect(kind_named(kind)((j,), {}, (run,)), np.array([base[j] * stronger]))
         for kind, base, changes in zip(_PLAIN, scene.friction, which, strict=True)
         if changes
         for run, stronger in zip(scene.runs, extra, strict=True)
@@ -167,7 +167,7 @@ def contact(scene: Scene, rng: np.random.Generator) -> Plant | None:
     if not unit > 0.0:
         return None
     values = direction * float(np.exp(rng.uniform(np.log(0.1), np.log(0.5)))) / unit
-    planted = Planted(effect, values)
+    planted = PlantedEffect(effect, values)
     if not shows(scene, [planted]):
         return None
     sizes = dict(zip(("fx", "fy", "fz"), map(float, values), strict=True))
@@ -185,7 +185,7 @@ def unknown_map(scene: Scene, rng: np.random.Generator) -> Plant | None:
     effect = kind((j, joints[-1]), map_shape(kind, rng, ranges))
     unit = float(ratios(effect, np.ones(1), scene.ground).max())
     values = np.array([np.exp(rng.uniform(np.log(0.08), np.log(0.25))) / max(unit, 1e-12)])
-    planted = Planted(effect, values)
+    planted = PlantedEffect(effect, values)
     left = left_over(scene.model, Sized(planted, 0.0, j, (j,)), scene.ground)
     strong = replace(scene, ground=replace(scene.ground, noise=4 * scene.ground.noise))
     if left < 0.1 or not shows(strong, [planted]):
@@ -243,9 +243,9 @@ def _other_friction(scene: Scene, runs: frozenset[str], rng: np.random.Generator
     change = float(rng.choice([-1.0, 1.0]) * rng.uniform(*_STRONGER))
     values = np.array([change * scene.friction[which, j]])
     effect = kind_named(_PLAIN[which])((j,), {}, tuple(sorted(runs)))
-    if not shows(scene, [Planted(effect, values)]):
+    if not shows(scene, [PlantedEffect(effect, values)]):
         return None
-    return as_plant(scene, Sized(Planted(effect, values), 0.0, j, (j,)))
+    return as_plant(scene, Sized(PlantedEffect(effect, values), 0.0, j, (j,)))
 
 
 def _in_runs(kind: str, scene: Scene, rng: np.random.Generator) -> Plant | None:

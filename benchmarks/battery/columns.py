@@ -20,7 +20,7 @@ from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.robot.model import Array
 from excite_cli.simulation.covariate_series import CovariateSeries
-from excite_cli.simulation.ground_truth import Planted
+from excite_cli.simulation.ground_truth import PlantedEffect
 from excite_cli.simulation.planned_motion import Planned
 
 MINUTES = 40.0
@@ -115,7 +115,7 @@ def friction_by_column(scene: Scene, rng: np.random.Generator) -> Plant | None:
         values = -change / width * friction
         named = zip(("coulomb_slope", "viscous_slope"), map(float, values), strict=True)
         sizes = {name: value for name, value in named if value}
-    planted = Planted(effect, values)
+    planted = PlantedEffect(effect, values)
     if not shows(scene, [planted]):
         return None
     return Plant(
@@ -129,7 +129,7 @@ def offset_by_column(scene: Scene, rng: np.random.Generator) -> Plant | None:
     middle, width = _range(scene)
     size = rng.uniform(*_OFFSET) * scene.ground.torque[j] / width * rng.choice([-1.0, 1.0])
     effect = kind_named("covariate_offset")((j,), {"reference": middle}, (), FOLLOWED)
-    planted = Planted(effect, np.array([size]))
+    planted = PlantedEffect(effect, np.array([size]))
     if not shows(scene, [planted]):
         return None
     sizes = {"offset_slope": float(size)}

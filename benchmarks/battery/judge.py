@@ -59,9 +59,9 @@ from excite_cli.identification.prepare import prepare
 from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.measurement.hdf5_writer import write_dataset
-from excite_cli.measurement.limits import Limits
 from excite_cli.measurement.quality import checked, raise_for_errors
-from excite_cli.simulation.ground_truth import Planted
+from excite_cli.measurement.recording_limits import RecordingLimits
+from excite_cli.simulation.ground_truth import PlantedEffect
 from excite_cli.simulation.simulate import simulate
 
 BOOKS = (EVERYDAY_FRICTION, (*EVERYDAY_FRICTION, "torque_offset"), (*EVERYDAY_FRICTION, *EVERYDAY))
@@ -176,7 +176,7 @@ def _judged(outcome: Outcome, case: Case, deck: Deck) -> Judged:
     if deck.beside == "before":
         outcome.rest = rests(case, data, found)
         told = {joint for each in found.approximations for joint in each.effect.joints}
-        told |= {each.joint for each in found.large_rests}
+        told |= {each.joint for each in found.excess_residuals}
         outcome.silent = [j for j, x in outcome.rest.items() if x > LARGE and j not in told]
     elif deck.beside == "textbook":
         outcome.best = _timed(outcome, "textbook", lambda: _textbook(case, data.dataset))
@@ -212,7 +212,7 @@ def _diagnosed(case: Case, data: Dataset, deck: Deck) -> Diagnosis:
 def _checked(dataset: Dataset, case: Case) -> Dataset:
     """The data as the reader of a file would hand them on."""
     limits = case.robot.robot.limits
-    known = Limits(
+    known = RecordingLimits(
         limits.lower, limits.upper, limits.velocity, limits.effort, ~case.robot.robot.sliding
     )
     runs, findings = checked(dataset.runs, case.spec.measurement, dataset.joint_names, known)
@@ -244,7 +244,7 @@ def oracle(case: Case, dataset: Dataset) -> Diagnosis:
     return diagnose(robot.robot, robot.base, dataset, case.spec.model_copy(update=update))
 
 
-def _spec(planted: Planted, case: Case) -> list[EffectSpec]:
+def _spec(planted: PlantedEffect, case: Case) -> list[EffectSpec]:
     """The effect as columns that the declared model does not have yet."""
     effect, names = planted.effect, case.robot.robot.joint_names
     friction = case.friction == "declared"
@@ -395,7 +395,7 @@ def _fill(outcome: Outcome, found: Diagnosis, answer: Answer, result: Score, dec
             "share": each.predictable,
             "depends_on": [covariate.code for covariate in each.depends_on],
         }
-        for each in found.large_rests
+        for each in found.excess_residuals
         if each.certain
     ]
     outcome.left = sorted(answer.said)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import BaseParameters, base_parameters_as_given
 from excite_cli.dynamics.regressor import Regressor

@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 
 from excite_cli.effects.catalogue import catalogue
-from excite_cli.simulation.ground_truth import Planted
+from excite_cli.simulation.ground_truth import PlantedEffect
 
 Verdict = Literal["true", "alias", "identity", "companion", "extra", "approximation", "wrong"]
 
@@ -68,7 +68,7 @@ class Plant:
 
     kinds: tuple[str, ...]
     joints: tuple[str, ...]
-    effects: tuple[Planted, ...] = ()
+    effects: tuple[PlantedEffect, ...] = ()
     runs: frozenset[str] = frozenset()
     by_run: Mapping[str, float] = field(default_factory=dict)
     sizes: Mapping[str, float] = field(default_factory=dict)

@@ -14,7 +14,7 @@ from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
-from excite_cli.simulation.ground_truth import Planted
+from excite_cli.simulation.ground_truth import PlantedEffect
 from excite_cli.simulation.planned_motion import Planned
 
 RATIOS = (0.03, 0.30)
@@ -57,7 +57,7 @@ def ground_of(
     robot: Robot,
     phi: Array,
     motions: Sequence[Planned],
-    declared: Sequence[Planted],
+    declared: Sequence[PlantedEffect],
     noise: float,
 ) -> Ground:
     """Signals of the motions with the torque of what is declared."""
@@ -80,11 +80,11 @@ def ground_of(
 class Sized:
     """An effect in the robot; `companions` come with it by nature and need not be found."""
 
-    planted: Planted
+    planted: PlantedEffect
     ratio: float
     strongest: int
     touched: tuple[int, ...]
-    companions: tuple[Planted, ...] = ()
+    companions: tuple[PlantedEffect, ...] = ()
 
 
 def size(
@@ -128,7 +128,7 @@ def sized_as(effect: Effect, values: Array, ratio: float | None, ground: Ground)
     touched = tuple(int(j) for j in np.flatnonzero(shares >= 0.1 * shares.max()))
     strongest = int(np.argmax(shares))
     return Sized(
-        Planted(effect, values),
+        PlantedEffect(effect, values),
         float(shares.max()),
         strongest,
         touched,
@@ -243,7 +243,7 @@ def _warming(values: Array, effect: Effect, ground: Ground) -> Array:
     return np.abs(values)
 
 
-def _companions(effect: Effect, values: Array) -> tuple[Planted, ...]:
+def _companions(effect: Effect, values: Array) -> tuple[PlantedEffect, ...]:
     """Plain friction without which it would give energy.
 
     The joints' own viscous shares of a coupled shaft; the dry friction that has a memory, or that
@@ -251,14 +251,14 @@ def _companions(effect: Effect, values: Array) -> tuple[Planted, ...]:
     """
     if effect.kind == "position_friction":
         mean = np.array([float(np.linalg.norm(values))])
-        return (Planted(kind_named(effect.varied)(effect.joints), mean),)
+        return (PlantedEffect(kind_named(effect.varied)(effect.joints), mean),)
     if effect.kind == "dahl_friction":
-        return (Planted(kind_named("coulomb_friction")(effect.joints), np.array(values)),)
+        return (PlantedEffect(kind_named("coulomb_friction")(effect.joints), np.array(values)),)
     coupled = effect.kind in ("coupled_friction", "outside:distant_coupling")
     if not coupled or values[0] == 0.0:
         return ()
     viscous = kind_named("viscous_friction")
-    return tuple(Planted(viscous((j,)), np.array([abs(values[0])])) for j in effect.joints)
+    return tuple(PlantedEffect(viscous((j,)), np.array([abs(values[0])])) for j in effect.joints)
 
 
 def ratios(effect: Effect, values: Array, ground: Ground) -> Array:

@@ -128,7 +128,7 @@ def _words(name: Name) -> str:
 
 def _ignored(config: Path) -> int:
     """Number of pairs of links that the proposed config leaves out."""
-    from excite_cli.config.load import load_spec
+    from excite_cli.config.load_spec import load_spec
 
     own = load_spec(config).constraints.self_collision
     return 0 if own is None else len(own.ignore)

@@ -25,7 +25,7 @@ from excite_cli.api.motions import load_motions
 from excite_cli.dynamics.base_parameters import base_parameters_as_given
 from excite_cli.effects.catalogue import catalogue, declared_effects, kind_named
 from excite_cli.robot.model import Robot
-from excite_cli.simulation.ground_truth import Planted, allowed_names, parse_planted
+from excite_cli.simulation.ground_truth import PlantedEffect, allowed_names, parse_planted
 from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
 
@@ -78,7 +78,7 @@ def _record(found: Sized, robot: Robot, takes: dict[str, tuple[str, ...]]) -> di
     }
 
 
-def words(planted: Planted, robot: Robot, takes: dict[str, tuple[str, ...]]) -> str:
+def words(planted: PlantedEffect, robot: Robot, takes: dict[str, tuple[str, ...]]) -> str:
     """As `--effect` takes it.
 
     Raises

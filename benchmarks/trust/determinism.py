@@ -151,7 +151,7 @@ _AT_A_MOTION = """
 import json, sys
 import numpy as np
 from pathlib import Path
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.excitation.problem import build_problem
 from excite_cli.store.result_file import read_result
 config = Path(sys.argv[1])

@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image
 
 from excite_cli.config.data_spec import MeasurementSpec
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.export.motions import MOTION_EXPORTERS
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.motion_files import read_own_motion

@@ -29,7 +29,7 @@ from benchmarks.trust.mutations import (
     spoiled_tree,
 )
 from benchmarks.trust.trial import Fuzzer
-from excite_cli.config.load import load_spec, parse_spec, spec_as_yaml
+from excite_cli.config.load_spec import load_spec, parse_spec, spec_as_yaml
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import find_base_parameters

@@ -7,7 +7,14 @@ from pathlib import Path
 from excite_cli.api.identifying import identify
 from excite_cli.api.loading import Case, load_case, measured_case, problem_of
 from excite_cli.api.planning import Planned, PlanProgress, plan, plan_after
-from excite_cli.campaign.records import Campaign, PlayedMotion, Purpose, Round, looked_for, pace_of
+from excite_cli.campaign.records import (
+    Campaign,
+    CampaignRound,
+    PlayedMotion,
+    Purpose,
+    looked_for,
+    pace_of,
+)
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.candidates import effect_of
@@ -52,7 +59,7 @@ class RoundPlans:
     progress: PlanProgress
     tell: Tell
 
-    def first(self, state: Campaign) -> Round:
+    def first(self, state: Campaign) -> CampaignRound:
         """Motions for the model as it is declared."""
         count = max(self.case.spec.sequence.motions or _FEWEST, _FEWEST)
         pace = pace_of(1, state.asked.from_speed)
@@ -61,9 +68,9 @@ class RoundPlans:
         self._say(f"round 1: {count} motions")
         result = self._planned(problem, path)
         motions = self._motions(1, "first", path, result, pace)
-        return Round(1, motions, efficiency=_efficiency(problem, result))
+        return CampaignRound(1, motions, efficiency=_efficiency(problem, result))
 
-    def following(self, state: Campaign, number: int) -> Round:
+    def following(self, state: Campaign, number: int) -> CampaignRound:
         """A motion for what is known, and one for what is not."""
         found = self.folder / diagnosis_of(number - 1)
         pace = pace_of(number, state.asked.from_speed)
@@ -86,7 +93,7 @@ class RoundPlans:
             logs = [self.folder / each.data for each in state.motions]
             result = self._planned(problem, path, logs)
             motions += self._motions(number, "explore", path, result, pace, len(motions))
-        return Round(number, motions, efficiency=efficiency)
+        return CampaignRound(number, motions, efficiency=efficiency)
 
     def _effects(self, found: Path) -> tuple[tuple[EffectSpec, ...], tuple[EffectSpec, ...]]:
         """What is declared or found, and what is neither, of effects that motions can show."""

@@ -12,7 +12,7 @@ from excite_cli.campaign.measure import Measure, NotMeasuredError, StillRunningE
 from excite_cli.campaign.measured_log import is_measured, record_measured, record_of, same_file
 from excite_cli.campaign.records import Campaign, PlayedMotion
 from excite_cli.campaign.same_motion import compared
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.errors import ExciteError, FileError, NoAdmissibleMotionError
 from excite_cli.measurement.motion_files import read_own_motion
 from excite_cli.shown.note import Level, Note, Tell

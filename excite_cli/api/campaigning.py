@@ -19,16 +19,22 @@ from excite_cli.api.loading import Case
 from excite_cli.api.planning import PlanProgress, plan_after
 from excite_cli.api.simulating import simulate
 from excite_cli.atomic import write_text_atomically
-from excite_cli.campaign.command import Command as Command
-from excite_cli.campaign.ending import ended, still_open
+from excite_cli.campaign.command import MeasureCommand as MeasureCommand
 from excite_cli.campaign.inbox import Inbox as Inbox
 from excite_cli.campaign.measure import Measure as Measure
 from excite_cli.campaign.measure import Take
-from excite_cli.campaign.records import STATE, Round, RoundFindings, read_campaign, write_campaign
-from excite_cli.campaign.records import Asked as Asked
+from excite_cli.campaign.records import (
+    STATE,
+    CampaignRound,
+    RoundFindings,
+    read_campaign,
+    write_campaign,
+)
 from excite_cli.campaign.records import Campaign as Campaign
+from excite_cli.campaign.records import CampaignOptions as CampaignOptions
+from excite_cli.campaign.stopping_rule import ended, still_open
 from excite_cli.claim import claim, leave
-from excite_cli.config.load import parse_spec, spec_as_yaml
+from excite_cli.config.load_spec import parse_spec, spec_as_yaml
 from excite_cli.config.spec import Spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.invariant import invariants
@@ -67,7 +73,7 @@ def run_campaign(
     case: Case,
     measure: Measure,
     folder: str | Path,
-    asked: Asked = Asked(),
+    asked: CampaignOptions = CampaignOptions(),
     *,
     retries: int = 2,
     resume: bool = False,
@@ -119,7 +125,7 @@ def _held(folder: Path) -> Iterator[None]:
         leave(folder / STATE)
 
 
-def _begun(case: Case, folder: Path, asked: Asked, resume: bool) -> Campaign:
+def _begun(case: Case, folder: Path, asked: CampaignOptions, resume: bool) -> Campaign:
     config = spec_as_yaml(case.spec)
     if (folder / STATE).exists() and not resume:
         raise FileError(
@@ -190,7 +196,7 @@ class _Loop:
         page = rounds_page(state, self.case.robot.name)
         write_text_atomically(self.folder / PAGE, render(page))
 
-    def _learned(self, state: Campaign, last: Round) -> RoundFindings:
+    def _learned(self, state: Campaign, last: CampaignRound) -> RoundFindings:
         path = self.folder / diagnosis_of(last.number)
         logs = [self.folder / each.data for each in state.motions]
         self._say(f"round {last.number}: diagnosis of {len(logs)} logs")

@@ -6,13 +6,13 @@ from pathlib import Path
 
 from excite_cli.api.arguments import checked
 from excite_cli.api.motions import Motions, load_motions
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.admissible import path_of
 from excite_cli.excitation.inspection import (
-    Difference,
     Inspections,
     Look,
+    SampleDifference,
     inspect,
     largest_mismatch,
     mesh_check_of,
@@ -138,7 +138,7 @@ def _samples(motions: Motions) -> dict[int, tuple[Array, ...]]:
     return {}
 
 
-def _difference(path: MotionPath, stored: tuple[Array, ...]) -> Difference:
+def _difference(path: MotionPath, stored: tuple[Array, ...]) -> SampleDifference:
     """That of the samples t (T,), q, v, a (T, n)."""
     t, *states = stored
-    return Difference(*largest_mismatch(path, t, states))
+    return SampleDifference(*largest_mismatch(path, t, states))

@@ -8,12 +8,12 @@ from excite_cli.api.arguments import checked
 from excite_cli.api.loading import inputs_of
 from excite_cli.api.outputs import held
 from excite_cli.api.planning import plan
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.errors import FileError
-from excite_cli.excitation.comparison import Comparison
 from excite_cli.excitation.motion import Doubt
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import random_baseline
+from excite_cli.excitation.random_comparison import Comparison
 from excite_cli.excitation.result import Result, matches
 from excite_cli.store.result_file import read_result, write_result
 from excite_cli.summary.motions import comparison_answer as comparison_answer

@@ -16,7 +16,7 @@ from excite_cli.api.loading import (
 )
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_text_atomically
-from excite_cli.config.load import spec_as_yaml
+from excite_cli.config.load_spec import spec_as_yaml
 from excite_cli.diagnosis.diagnose import diagnose as diagnose_dataset
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.diagnosis.words import no_gain_in_words

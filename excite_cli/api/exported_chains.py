@@ -7,7 +7,7 @@ from pathlib import Path
 from excite_cli.api.approach import Start, entered, start_posture
 from excite_cli.api.motions import is_motion, motions_of
 from excite_cli.config.constraints_spec import ConstraintsSpec, JointLimitsSpec
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.catalogue import build_constraints
 from excite_cli.errors import ExciteError, FileError
@@ -29,7 +29,7 @@ from excite_cli.trajectory.sampled import through_samples
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ChainRequest:
     """Which motions of a result (none: all), how often, how slow, and from which posture.
 
     `unproved`: also those that do not count as proved.
@@ -56,7 +56,7 @@ class ExportedChain:
     doubt: Doubt = Doubt.NONE
 
 
-def chains_of(file: Path, wanted: Wanted, tell: Tell) -> list[ExportedChain]:
+def chains_of(file: Path, wanted: ChainRequest, tell: Tell) -> list[ExportedChain]:
     """The motions requested, ready to be sampled.
 
     Raises
@@ -88,7 +88,7 @@ def chains_of(file: Path, wanted: Wanted, tell: Tell) -> list[ExportedChain]:
     ]
 
 
-def _own_motion(file: Path, wanted: Wanted) -> tuple[tuple[str, ...], Segment]:
+def _own_motion(file: Path, wanted: ChainRequest) -> tuple[tuple[str, ...], Segment]:
     """Joint names and the motion of a file in a controller's format."""
     others = [number for number in wanted.chosen if number != 1]
     if others:
@@ -105,7 +105,7 @@ def _own_motion(file: Path, wanted: Wanted) -> tuple[tuple[str, ...], Segment]:
 
 
 def _doubts(
-    file: Path, result: Result, motions: Sequence[Segment], wanted: Wanted, tell: Tell
+    file: Path, result: Result, motions: Sequence[Segment], wanted: ChainRequest, tell: Tell
 ) -> list[Doubt]:
     """Why motions do not count as proved; such are written only where that was requested.
 
@@ -163,7 +163,7 @@ def _joint_bounds(file: Path, result: Result) -> tuple[Constraint, ...]:
 
 
 def _entered(
-    file: Path, result: Result, motions: Sequence[Segment], wanted: Wanted, tell: Tell
+    file: Path, result: Result, motions: Sequence[Segment], wanted: ChainRequest, tell: Tell
 ) -> tuple[list[Chain], tuple[Constraint, ...]]:
     """The motions from rest at a posture and back to it, and the constraints of their problem."""
     spec = parse_spec(result.config, f"the config stored in {file}")

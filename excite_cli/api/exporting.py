@@ -7,12 +7,12 @@ from pathlib import Path
 
 from excite_cli.api.approach import Start, durations_of
 from excite_cli.api.arguments import checked
-from excite_cli.api.exported_chains import ExportedChain, Wanted, chains_of
+from excite_cli.api.exported_chains import ChainRequest, ExportedChain, chains_of
 from excite_cli.api.models import for_simulators, write_exported, write_model, write_models
 from excite_cli.api.outputs import held
 from excite_cli.api.paths import existing, paths_in
 from excite_cli.claim import claim, leave
-from excite_cli.config.load import files_of_config
+from excite_cli.config.load_spec import files_of_config
 from excite_cli.errors import ConfigError, FileError, nearest
 from excite_cli.export.c_model import c_model
 from excite_cli.export.motion_exporter import MotionExporter
@@ -129,7 +129,7 @@ def export_file(
         limits = None if thresholds is None else existing(thresholds)
         return _export_model(path, format, target, limits, overwrite, tell)
     exporter = MOTION_EXPORTERS[format]
-    chains = chains_of(path, Wanted(chosen, periods, slow, start, allow_unproved), tell)
+    chains = chains_of(path, ChainRequest(chosen, periods, slow, start, allow_unproved), tell)
     paths = _paths(path, target, exporter, [each.name for each in chains])
     refuse_inputs_as_outputs({f"--output ({to})": to for to in paths}, (path,))
     with _held(paths, exporter, overwrite):

@@ -17,13 +17,13 @@ from excite_cli.api.loading import (
 from excite_cli.api.models import write_models
 from excite_cli.api.outputs import held
 from excite_cli.checks.all_checks import check_dataset
-from excite_cli.config.load import spec_as_yaml
+from excite_cli.config.load_spec import spec_as_yaml
 from excite_cli.excitation.problem import Problem
 from excite_cli.given_files import refuse_inputs_as_outputs
+from excite_cli.identification.carried_load import LoadIdentification
+from excite_cli.identification.carried_load import identify_load as load_on
 from excite_cli.identification.identify import Identification
 from excite_cli.identification.identify import identify as identify_dataset
-from excite_cli.identification.load import LoadIdentification
-from excite_cli.identification.load import identify_load as load_on
 from excite_cli.identification.stored_model import StoredFit
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.shown.note import Level, Note, Tell, log_note

@@ -19,11 +19,11 @@ from excite_cli.api.paths import page_path
 from excite_cli.atomic import write_atomically, write_text_atomically
 from excite_cli.checks import rows
 from excite_cli.checks.all_checks import look
-from excite_cli.checks.result import Result
+from excite_cli.checks.check_result import CheckResult
 from excite_cli.checks.sentences import BELONG, written
 from excite_cli.checks.trust import but_trusted, check_names
 from excite_cli.config.commented_yaml import amended, changed_values, with_values
-from excite_cli.config.load import load_spec, spec_of
+from excite_cli.config.load_spec import load_spec, spec_of
 from excite_cli.config.plain_yaml import yaml_text
 from excite_cli.errors import ExciteError
 from excite_cli.excitation.problem import Problem
@@ -45,7 +45,7 @@ _ROUNDS = 4  # of looking, each with what the one before would set
 class LogInspection(Shown):
     """`results` in the order of the checks; `settings`: what would change in the config."""
 
-    results: tuple[Result, ...]
+    results: tuple[CheckResult, ...]
     settings: Mapping[str, Any] = field(default_factory=dict)
     runs: tuple[str, ...] = ()
 
@@ -125,17 +125,19 @@ def inspect(
         return inspection
 
 
-def _in_vain(settings: Mapping[str, Any], error: ExciteError) -> Result:
+def _in_vain(settings: Mapping[str, Any], error: ExciteError) -> CheckResult:
     """That the data cannot be used with what would settle what is seen in the files."""
     text = f"with {written(settings)} the data cannot be used: {error}".removesuffix(".")
-    return Result(BELONG, "in_vain", "fault", text)
+    return CheckResult(BELONG, "in_vain", "fault", text)
 
 
-def _key(result: Result) -> tuple[str, tuple[str, ...], str]:
+def _key(result: CheckResult) -> tuple[str, tuple[str, ...], str]:
     return result.name, result.joints, result.status
 
 
-def _looked(case: Case, recorded: Dataset, settled: Mapping[str, Any]) -> tuple[list[Result], bool]:
+def _looked(
+    case: Case, recorded: Dataset, settled: Mapping[str, Any]
+) -> tuple[list[CheckResult], bool]:
     """What is seen in files; and, where they may be used, what the dynamics say of them, and true.
 
     Of a unit or a clock that is not `settled` yet they would say what is wrong.

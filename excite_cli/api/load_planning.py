@@ -11,12 +11,12 @@ from excite_cli.api.arguments import checked
 from excite_cli.api.loading import Case, problem_of
 from excite_cli.api.outputs import held
 from excite_cli.api.planning import plan
-from excite_cli.config.load import spec_as_yaml
+from excite_cli.config.load_spec import spec_as_yaml
 from excite_cli.config.spec import FourierSpec, SamplingSpec, SequenceSpec, Spec
 from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
-from excite_cli.identification.load import ExpectedLoad, expected_load, require_same
+from excite_cli.identification.carried_load import ExpectedLoad, expected_load, require_same
 from excite_cli.identification.stored_model import StoredFit
 from excite_cli.robot.link_frame import carrying_frame
 from excite_cli.shown.note import Level, Note, Tell, log_note

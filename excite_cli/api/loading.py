@@ -10,9 +10,9 @@ import numpy as np
 
 from excite_cli.api.arguments import checked
 from excite_cli.api.paths import paths_in, refuse_twice
-from excite_cli.base_link.rows import with_base
+from excite_cli.base_link.wrench_rows import with_base
 from excite_cli.checks.bodies import bodies_in_words
-from excite_cli.config.load import files_of_config, load_spec, parse_spec, spec_of
+from excite_cli.config.load_spec import files_of_config, load_spec, parse_spec, spec_of
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.dynamics.regressor import InverseDynamics

@@ -8,7 +8,7 @@ import numpy as np
 
 from excite_cli.api.arguments import checked
 from excite_cli.api.loading import Case, dataset_of, load_data
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.config.spec import Spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem

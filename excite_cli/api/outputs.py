@@ -55,7 +55,7 @@ def result_path(output: Path | None, config: Path) -> Path:
     """Where the result of `config` goes."""
     path = output or Path(f"{config.stem}.h5")
     if path.is_file() and config.is_file() and path.samefile(config):
-        from excite_cli.config.load import load_spec  # `excite --help` needs none
+        from excite_cli.config.load_spec import load_spec  # `excite --help` needs none
 
         load_spec(config)  # tells that this is no config
     return path

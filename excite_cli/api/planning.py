@@ -22,7 +22,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Progress as Progress
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.run import continue_run, new_result, resumed_result
-from excite_cli.excitation.sequence import Step
+from excite_cli.excitation.sequence import FinishedMotion
 from excite_cli.excitation.stack import Stack
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.shown.note import Level, Note, Tell, log_note
@@ -149,7 +149,7 @@ def plan(
     following = problem if isinstance(problem, NextMotion) else None
     model = problem.model if isinstance(problem, NextMotion) else problem
 
-    def store(step: Step, current: Result) -> None:
+    def store(step: FinishedMotion, current: Result) -> None:
         if path is not None:
             write_result(path, current, model)
         tell(Note(Level.INFO, motion_sentence(step.motion)))

@@ -13,7 +13,7 @@ from excite_cli.errors import ConfigError, RobotError, nearest
 from excite_cli.proposal.joints import choose_joints, limbs
 from excite_cli.proposal.propose import Proposal, Request
 from excite_cli.proposal.propose import propose as propose_config
-from excite_cli.robot.allowed_files import Needed as Needed
+from excite_cli.robot.allowed_files import FolderRequest as FolderRequest
 from excite_cli.robot.description import EXAMPLE_PREFIX, example_robots, is_named
 from excite_cli.robot.model import build_robot
 from excite_cli.robot.overview import DescribedRobot, describe, known_robots

@@ -23,7 +23,7 @@ from excite_cli.robot.model import Array, Robot
 from excite_cli.scoring.records import Replay
 from excite_cli.scoring.score import Scorer
 from excite_cli.shown.note import Level, Note, Tell, log_note
-from excite_cli.simulation.replay import Played, drift, inertias
+from excite_cli.simulation.replay import ReplayInput, drift, inertias
 from excite_cli.summary.simulation import replay_answer as replay_answer
 
 _POSTURES = 40
@@ -71,7 +71,7 @@ def replay(
     inertia = inertias(exported.text, postures)
     lost: list[str] = []
 
-    def deviation(text: str, played: list[Played], name: str) -> dict[str, float]:
+    def deviation(text: str, played: list[ReplayInput], name: str) -> dict[str, float]:
         found = drift(text, [_of_all(robot, run) for run in played], inertia)
         if found.lost:
             lost.append(name)
@@ -112,17 +112,17 @@ def _urdf(robot: Robot) -> ModelText | str | None:
         return f"the URDF is not played: {refused}"
 
 
-def _played(run: PreparedRun, torque: Array) -> Played:
-    return Played(run.t, run.q, run.v, torque)
+def _played(run: PreparedRun, torque: Array) -> ReplayInput:
+    return ReplayInput(run.t, run.q, run.v, torque)
 
 
-def _of_all(robot: Robot, run: Played) -> Played:
+def _of_all(robot: Robot, run: ReplayInput) -> ReplayInput:
     """The run with the joints that follow others, which no motor drives."""
     if robot.coupling is None:
         return run
     torque = np.zeros((len(run.t), robot.tree.n))
     torque[:, np.array(robot.model_joints) - robot.first_joint] = run.torque
-    return Played(run.t, robot.all_positions(run.q), robot.all_rates(run.v), torque)
+    return ReplayInput(run.t, robot.all_positions(run.q), robot.all_rates(run.v), torque)
 
 
 def _of_robot(model: Model, run: PreparedRun) -> Array:

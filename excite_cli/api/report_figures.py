@@ -31,7 +31,7 @@ from excite_cli.store.score_file import is_score, read_score
 
 
 @dataclass(frozen=True)
-class Told:
+class ReportedFile:
     """One file: its name on the page, and what it holds."""
 
     path: Path
@@ -50,7 +50,7 @@ class Told:
         return (Result, StoredFit, Diagnosis, Score).index(type(self.content))
 
 
-def read_files(paths: Sequence[Path]) -> tuple[Told, ...]:
+def read_files(paths: Sequence[Path]) -> tuple[ReportedFile, ...]:
     """Everything that `paths` hold, motions before fits before diagnoses before what follows them.
 
     Raises
@@ -63,7 +63,7 @@ def read_files(paths: Sequence[Path]) -> tuple[Told, ...]:
     names = [
         path.stem if stems.count(path.stem) == 1 else str(path.with_suffix("")) for path in paths
     ]
-    found = [Told(path, name, _read(path)) for path, name in zip(paths, names, strict=True)]
+    found = [ReportedFile(path, name, _read(path)) for path, name in zip(paths, names, strict=True)]
     return in_order(found)
 
 
@@ -86,9 +86,9 @@ def _read(path: Path) -> Result | StoredFit | Diagnosis | Score:
         ) from error
 
 
-def in_order(files: Sequence[Told]) -> tuple[Told, ...]:
+def in_order(files: Sequence[ReportedFile]) -> tuple[ReportedFile, ...]:
     """By stage, but nothing before the files it was made on top of."""
-    left, placed = sorted(files, key=lambda each: each.stage), list[Told]()
+    left, placed = sorted(files, key=lambda each: each.stage), list[ReportedFile]()
     while left:
         waiting = {each.path.name for each in left}
         ready = [each for each in left if not each.earlier & (waiting - {each.path.name})]
@@ -102,7 +102,7 @@ Progress = Callable[[str, int, int], None]
 
 
 def write_figures(
-    told: Sequence[Told],
+    told: Sequence[ReportedFile],
     problems: Mapping[Path, Problem],
     asked: tuple[Path, str | None, bool],
     progress: Progress,

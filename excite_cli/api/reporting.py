@@ -8,7 +8,7 @@ from excite_cli.api.arguments import checked
 from excite_cli.api.loading import rebuilt_problem, with_own_margins
 from excite_cli.api.outputs import held
 from excite_cli.api.paths import page_path, paths_in
-from excite_cli.api.report_figures import Told, read_files, write_figures
+from excite_cli.api.report_figures import ReportedFile, read_files, write_figures
 from excite_cli.atomic import write_text_atomically
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.excitation.problem import Problem
@@ -105,7 +105,7 @@ def write_report(
     return Report(page, drawn, tuple(doubts))
 
 
-def _with_own_margins(file: Told, problems: Mapping[Path, Problem]) -> Told:
+def _with_own_margins(file: ReportedFile, problems: Mapping[Path, Problem]) -> ReportedFile:
     """The file, with margins taken anew of motions that its own may not be of."""
     if not isinstance(file.content, Result):
         return file
@@ -123,7 +123,10 @@ def report_answer(found: Report) -> Answer:
 
 
 def _page_text(
-    told: Sequence[Told], problems: Mapping[Path, Problem], picture: bool, progress: Progress
+    told: Sequence[ReportedFile],
+    problems: Mapping[Path, Problem],
+    picture: bool,
+    progress: Progress,
 ) -> str:
     sources = [
         Source(each.name, each.path.name, each.content, problems.get(each.path), picture)

@@ -1,6 +1,6 @@
 """What the library hands to whoever shows it: notes on the way, an answer at the end."""
 
-from excite_cli.excitation.progress import Measure as Measure
+from excite_cli.excitation.progress import ProgressMeasure as ProgressMeasure
 from excite_cli.excitation.progress import figure_in_words as figure_in_words
 from excite_cli.shown.answer import Answer as Answer
 from excite_cli.shown.answer import Command as Command

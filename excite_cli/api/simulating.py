@@ -11,7 +11,7 @@ from excite_cli.api.loading import Case, inputs_of, measured_case, problem_of
 from excite_cli.api.motions import Motions, load_motions
 from excite_cli.api.outputs import held
 from excite_cli.config.data_spec import MeasurementSpec
-from excite_cli.config.load import spec_as_yaml
+from excite_cli.config.load_spec import spec_as_yaml
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem

@@ -8,7 +8,7 @@ from excite_cli.api.diagnosing import diagnose
 from excite_cli.api.identifying import identify, save_fit
 from excite_cli.api.loading import load_case, load_data, load_problem
 from excite_cli.api.planning import plan
-from excite_cli.config.load import files_of_config, load_spec
+from excite_cli.config.load_spec import files_of_config, load_spec
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.progress import Progress, figure_in_words

@@ -9,7 +9,7 @@ from typing import BinaryIO
 from excite_cli.campaign.measure import Measure, NotMeasuredError, StillRunningError, Take
 from excite_cli.campaign.one_at_a_time import held_while_it_runs
 from excite_cli.campaign.supervised import CannotRunError, Held, followed, held_signals
-from excite_cli.campaign.supervisor import Ended, Job
+from excite_cli.campaign.supervisor import Job, ProgramExit
 from excite_cli.errors import ConfigError
 from excite_cli.shown.note import Level, Note, Tell, log_note, saying
 
@@ -19,7 +19,7 @@ _TIMES, _MORE = 5.0, 60.0  # the limit of time: so many times the motion, and so
 
 
 @dataclass(frozen=True)
-class Command(Measure):
+class MeasureCommand(Measure):
     """Runs `words`, in which {motion} and {data} become whole paths, {name} the motion's name.
 
     No shell is between. Exit status 0 means measured. `limit` [s]; None: five times the motion and
@@ -41,7 +41,7 @@ class Command(Measure):
         limit: float | None = None,
         tell: Tell = log_note,
         grace: float = _GRACE,
-    ) -> "Command":
+    ) -> "MeasureCommand":
         """The command of a line as it is typed.
 
         Raises
@@ -94,7 +94,7 @@ class Command(Measure):
         held.deliver()
         self._require_measured(take, ended)
 
-    def _run(self, job: Job, diary: BinaryIO, held: Held, take: Take) -> Ended:
+    def _run(self, job: Job, diary: BinaryIO, held: Held, take: Take) -> ProgramExit:
         try:
             return followed(job, diary, held, saying(self.tell, Level.WARNING))
         except CannotRunError as error:
@@ -103,7 +103,7 @@ class Command(Measure):
                 "that is on the path, or its whole path."
             ) from error
 
-    def _require_measured(self, take: Take, ended: Ended) -> None:
+    def _require_measured(self, take: Take, ended: ProgramExit) -> None:
         """Raise where a program has not ended by itself, with status 0 and a log."""
         said = _last_words(take.diary)
         if ended.why == "limit":

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from excite_cli.campaign.measure import StillRunningError
-from excite_cli.campaign.processes import Process, boot, in_words, marked, of_session
+from excite_cli.campaign.process_table import Process, boot, in_words, marked, of_session
 from excite_cli.errors import FileError, refusal
 from excite_cli.shown.note import Level, Note, Tell
 

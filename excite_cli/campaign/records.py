@@ -50,7 +50,7 @@ End = Literal["", "complete", "budget", "stuck"]
 
 
 @dataclass(frozen=True)
-class Asked:
+class CampaignOptions:
     """What was asked of a campaign when it began.
 
     `from_speed`: pace of the first round, as a share of the motions' own; `most_rounds` and
@@ -103,7 +103,7 @@ class RoundFindings:
 
 
 @dataclass(frozen=True)
-class Round:
+class CampaignRound:
     """Motions that are planned together, and what was learned from them and all before.
 
     `efficiency`: how much an instant of those planned for the model tells of the inertias, as a
@@ -120,7 +120,7 @@ class Round:
         """The first motion that has no log yet."""
         return next((each for each in self.motions if not each.data), None)
 
-    def with_motion(self, motion: PlayedMotion) -> "Round":
+    def with_motion(self, motion: PlayedMotion) -> "CampaignRound":
         """With another record of the motion of that name."""
         motions = tuple(motion if each.name == motion.name else each for each in self.motions)
         return replace(self, motions=motions)
@@ -133,8 +133,8 @@ class Campaign(Shown):
     config: str
     config_folder: str
     fingerprint: str
-    asked: Asked
-    rounds: tuple[Round, ...] = ()
+    asked: CampaignOptions
+    rounds: tuple[CampaignRound, ...] = ()
     ended: End = ""
     reason: str = ""
     versions: dict[str, str] = field(default_factory=dict)
@@ -149,7 +149,7 @@ class Campaign(Shown):
         """How long the robot moved [s]."""
         return sum(each.seconds for each in self.motions)
 
-    def with_round(self, last: Round) -> "Campaign":
+    def with_round(self, last: CampaignRound) -> "Campaign":
         """With another record of the round of that number, or one more."""
         before = tuple(each for each in self.rounds if each.number != last.number)
         return replace(self, rounds=(*before, last))

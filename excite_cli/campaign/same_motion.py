@@ -26,7 +26,7 @@ _WHOLE = 0.95  # of the motion's duration
 
 
 @dataclass(frozen=True)
-class Compared:
+class MotionMatch:
     """Lag of the log [s]; of every joint that moves, how far it is off, as a share; what is wrong.
 
     `reason` is empty where the log is that of the motion; `doubt` says which joints could not
@@ -41,7 +41,7 @@ class Compared:
 
 def compared(
     planned: tuple[Array, Array], measured: tuple[Array, Array], joint_names: Sequence[str]
-) -> Compared:
+) -> MotionMatch:
     """Times (T,) and positions (T, n) that were planned and measured."""
     (t, q), (t_log, q_log) = (_resampled(*each) for each in (planned, measured))
     seconds, logged = t[-1] - t[0], t_log[-1] - t_log[0]
@@ -49,10 +49,10 @@ def compared(
     deviation = np.sqrt(np.square(away).mean(axis=0))
     moving = np.flatnonzero(deviation > _MOVES)
     if not len(moving):
-        return Compared(0.0, {})
+        return MotionMatch(0.0, {})
     if logged < _WHOLE * seconds:
         reason = f"it lasts {logged:.1f} s, and the motion {seconds:.1f} s: it is not whole"
-        return Compared(0.0, {}, reason)
+        return MotionMatch(0.0, {}, reason)
     first = _best_start(q[:, moving], q_log[:, moving], deviation[moving])
     at = np.clip(first + np.arange(len(q)), 0, len(q_log) - 1)
     difference = q_log[at] - q
@@ -84,7 +84,7 @@ def compared(
             f"the robot could not follow the motion: off by more than {_OFF:.0%} of a joint's "
             f"deviation: {shares}. The log holds what it did instead, and is used"
         )
-    return Compared(float(first) / _RATE, off, reason, doubt)
+    return MotionMatch(float(first) / _RATE, off, reason, doubt)
 
 
 def _resampled(t: Array, q: Array) -> tuple[Array, Array]:

@@ -16,8 +16,8 @@ from types import FrameType
 from typing import Any, BinaryIO
 
 from excite_cli.campaign.one_at_a_time import left_in, session_of
-from excite_cli.campaign.processes import MARK, Escalation, in_words
-from excite_cli.campaign.supervisor import Ended, Job
+from excite_cli.campaign.process_table import MARK, Escalation, in_words
+from excite_cli.campaign.supervisor import Job, ProgramExit
 from excite_cli.robot.confinement import command
 
 # Signals that ask this process to end are counted, and delivered once something else has ended.
@@ -87,7 +87,7 @@ class _LostError(Exception):
     """The supervisor is gone without a word, or silent: it was killed or stopped."""
 
 
-def followed(job: Job, diary: BinaryIO, held: Held, say: Say) -> Ended:
+def followed(job: Job, diary: BinaryIO, held: Held, say: Say) -> ProgramExit:
     """Run the program until nothing of it runs, or what cannot be ended is known.
 
     Every signal that is `held` asks for its end. So does any exception in here, which is raised
@@ -165,7 +165,7 @@ class _Supervised:
             self._process.wait(_SILENT)
 
 
-def _to_its_end(program: _Supervised, job: Job, held: Held, say: Say) -> Ended:
+def _to_its_end(program: _Supervised, job: Job, held: Held, say: Say) -> ProgramExit:
     asked, lost = 0, inf
     while True:
         while asked < held.count:
@@ -192,10 +192,10 @@ def _to_its_end(program: _Supervised, job: Job, held: Held, say: Say) -> Ended:
                 f"for that; what still runs in {job.grace:g} s is ended"
             )
         else:
-            return Ended(**news)
+            return ProgramExit(**news)
 
 
-def _end_whatever_comes(program: _Supervised, job: Job, held: Held) -> Ended:
+def _end_whatever_comes(program: _Supervised, job: Job, held: Held) -> ProgramExit:
     """Asked to end once more for everything that is raised meanwhile."""
     while True:
         try:
@@ -207,7 +207,7 @@ def _end_whatever_comes(program: _Supervised, job: Job, held: Held) -> Ended:
             continue
 
 
-def _ended_without_supervisor(program: _Supervised, job: Job, held: Held) -> Ended:
+def _ended_without_supervisor(program: _Supervised, job: Job, held: Held) -> ProgramExit:
     """End what can be found of a program that has lost its supervisor."""
     folder = Path(job.log).parent
     ending = Escalation(lambda: left_in(folder), session_of(folder), job.grace)
@@ -220,4 +220,4 @@ def _ended_without_supervisor(program: _Supervised, job: Job, held: Held) -> End
         ending.step()
         time.sleep(_POLL)
     program.kill()
-    return Ended(None, "lost", alive=in_words(left_in(folder)))
+    return ProgramExit(None, "lost", alive=in_words(left_in(folder)))

@@ -6,7 +6,7 @@ time and records how the program ended, also where the campaign was killed meanw
 
 The campaign sends the job as one line, then a byte each time it asks for the program's end. News
 come back as lines of JSON: `cannot` (the program cannot be run), `waits` (what a program that has
-ended left running), and `Ended`.
+ended left running), and `ProgramExit`.
 """
 
 import json
@@ -27,7 +27,7 @@ from types import FrameType
 from typing import Any
 
 from excite_cli.campaign.measured_log import record_measured
-from excite_cli.campaign.processes import (
+from excite_cli.campaign.process_table import (
     Escalation,
     Process,
     adopt_orphans,
@@ -58,7 +58,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Ended:
+class ProgramExit:
     """How a program ended, in words where it is about processes.
 
     `status`: as of `subprocess`, None where it still runs. `why`: `limit` or `asked` where it was
@@ -194,7 +194,7 @@ class _Supervisor:
                 record_measured(log)
             except ExciteError as error:
                 fault = str(error)
-        ended = Ended(self._status, self._why, self._left, in_words(alive), fault)
+        ended = ProgramExit(self._status, self._why, self._left, in_words(alive), fault)
         self._say(asdict(ended))
 
     def _say(self, news: dict[str, Any]) -> None:

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from excite_cli.checks import foreign_runs, rows, sentences, standing_legs
+from excite_cli.checks.check_result import CheckResult
 from excite_cli.checks.own import Log, own_checks
-from excite_cli.checks.result import Result
 from excite_cli.checks.samples import samples_of
 from excite_cli.checks.set_up_search import CHECKS, mistakes
 from excite_cli.checks.setup import Setup
@@ -31,24 +31,24 @@ _NOTHING = 0.4  # share left in the median of the joints with which no set-up is
 
 def look(
     robot: Robot, runs: Sequence[Run], prepared: Sequence[PreparedRun], spec: Spec
-) -> list[Result]:
+) -> list[CheckResult]:
     """Doubts and faults of the runs, filtered and as recorded; of what is trusted, a word."""
     return but_trusted(_look(robot, runs, prepared, spec), spec)
 
 
 def _look(
     robot: Robot, runs: Sequence[Run], prepared: Sequence[PreparedRun], spec: Spec
-) -> list[Result]:
+) -> list[CheckResult]:
     clocked = any(run.dq is not None for run in runs)
     samples = replace(samples_of(prepared, _SAMPLES, clocked), turns=~robot.sliding)
     if spec.measurement.trust is True or not len(samples.q):
         why = "measurement.trust is set" if len(samples.q) else "no joint moves for long enough"
         text = f"mount, zeros, signs, order, units and clock are not judged: {why}"
-        return [Result(sentences.BELONG, "not_judged", "ok", text)]
+        return [CheckResult(sentences.BELONG, "not_judged", "ok", text)]
     fit, declared, names = TextbookFit(robot, samples), Setup.as_declared(robot), robot.joint_names
     steps = mistakes(fit, spec)
     setup = steps[-1].after.setup if steps else declared
-    foreign: list[Result] = []
+    foreign: list[CheckResult] = []
     if not is_trusted(foreign_runs.NAME, spec):
         foreign = foreign_runs.foreign_runs(robot, prepared, setup if steps else None)
     rest = [run for run in prepared if run.run.name not in {each.runs for each in foreign}]
@@ -97,7 +97,7 @@ def findings_of(
     return (*motion, *doubts), is_open and spec.measurement.trust is not True
 
 
-def without_fault(found: Sequence[Result]) -> Sequence[Result]:
+def without_fault(found: Sequence[CheckResult]) -> Sequence[CheckResult]:
     """The same, if none of them is a fault.
 
     Raises

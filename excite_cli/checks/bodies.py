@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.checks.result import Result, Status
+from excite_cli.checks.check_result import CheckResult, Status
 from excite_cli.robot.formats.urdf_parts import origin_of
 from excite_cli.robot.model import Array, Robot
 
@@ -76,7 +76,7 @@ def bodies_in_words(robot: Robot) -> str:
     return "; ".join(each.evidence for each in impossible_bodies(robot))
 
 
-def impossible_bodies(robot: Robot) -> list[Result]:
+def impossible_bodies(robot: Robot) -> list[CheckResult]:
     """A fault for links that no body is like; a doubt for those that hardly any is."""
     found = []
     for body in link_bodies(robot):
@@ -90,7 +90,7 @@ def impossible_bodies(robot: Robot) -> list[Result]:
             text = f"{body.name} cannot be a body: {why}"
             if status == "doubt":
                 text = f"{body.name} is hardly possible as a body: {why}"
-            found.append(Result(NAME, "impossible_body", status, text))
+            found.append(CheckResult(NAME, "impossible_body", status, text))
     return found
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from excite_cli.checks.base import Alternative, Settings, SetupCheck
 from excite_cli.checks.setup import Order, Setup
-from excite_cli.checks.textbook_fit import Explained, TextbookFit
+from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
 from excite_cli.config.spec import Spec
 
 _ALONE = 0.35  # price, in L, of positions that are exchanged without their torques
@@ -32,7 +32,7 @@ class ColumnOrder(SetupCheck):
     kind = "order"
 
     def alternatives(
-        self, fit: TextbookFit, setup: Setup, explained: Explained
+        self, fit: TextbookFit, setup: Setup, explained: TextbookShares
     ) -> Iterator[Alternative]:
         """Everything one step away."""
         for order in _orders(len(setup.zero)):

@@ -11,10 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from excite_cli.checks.result import Result, Status
+from excite_cli.checks.check_result import CheckResult, Status
 from excite_cli.checks.samples import samples_of
 from excite_cli.checks.setup import Setup
-from excite_cli.checks.textbook_fit import Explained, TextbookFit
+from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Robot
 
@@ -29,7 +29,7 @@ _BELONGS = 0.3  # of it, left by the motion that they belong to
 
 def foreign_runs(
     robot: Robot, runs: Sequence[PreparedRun], cure: Setup | None = None
-) -> list[Result]:
+) -> list[CheckResult]:
     """Every run whose torques do not fit its motion, as those of the others do theirs.
 
     A fault where they fit that of another run, else a doubt. None is foreign where another set-up,
@@ -55,7 +55,7 @@ def foreign_runs(
             f"Join its channels anew, or leave this run out; measurement.trust: [{NAME}] takes it"
         )
         status: Status = "fault" if owner else "doubt"
-        found.append(Result(NAME, "foreign_torque", status, text, runs=name, is_open=True))
+        found.append(CheckResult(NAME, "foreign_torque", status, text, runs=name, is_open=True))
     return found
 
 
@@ -82,7 +82,7 @@ def _foreign(fits: Mapping[str, TextbookFit], setup: Setup) -> dict[str, str]:
     return why
 
 
-def _missed(fit: TextbookFit, setup: Setup, found: Explained) -> float:
+def _missed(fit: TextbookFit, setup: Setup, found: TextbookShares) -> float:
     """Share that is missed, in the median of the joints; 0 where no joint moves in both."""
     shares = fit.missed(setup, found)
     return float(np.nanmedian(shares)) if np.isfinite(shares).any() else 0.0
@@ -96,7 +96,7 @@ def _recordings(runs: Sequence[PreparedRun]) -> Mapping[str, list[PreparedRun]]:
 
 
 def _owner(
-    robot: Robot, recordings: Mapping[str, list[PreparedRun]], name: str, own: Explained
+    robot: Robot, recordings: Mapping[str, list[PreparedRun]], name: str, own: TextbookShares
 ) -> str:
     """The run whose motion the torques of run `name` fit; empty if there is none."""
     torques, setup = recordings[name], Setup.as_declared(robot)

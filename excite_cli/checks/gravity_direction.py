@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from excite_cli.checks.base import Alternative, Settings, SetupCheck
 from excite_cli.checks.setup import Setup
-from excite_cli.checks.textbook_fit import Explained, TextbookFit
+from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
 from excite_cli.config.spec import Spec
 from excite_cli.robot.model import Array
 
@@ -39,7 +39,7 @@ class GravityDirection(SetupCheck):
     kind = "mount"
 
     def alternatives(
-        self, fit: TextbookFit, setup: Setup, explained: Explained
+        self, fit: TextbookFit, setup: Setup, explained: TextbookShares
     ) -> Iterator[Alternative]:
         """The direction that fits as it is linear; walls, the ceiling, and half way between."""
         held = not (fit.robot.floating or fit.robot.base_joints)

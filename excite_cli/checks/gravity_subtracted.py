@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from excite_cli.checks.base import Alternative, Settings, SetupCheck
 from excite_cli.checks.setup import Setup
-from excite_cli.checks.textbook_fit import Explained, TextbookFit
+from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
 from excite_cli.config.spec import Spec
 
 
@@ -17,7 +17,7 @@ class GravitySubtracted(SetupCheck):
     of_all = True
 
     def alternatives(
-        self, fit: TextbookFit, setup: Setup, explained: Explained
+        self, fit: TextbookFit, setup: Setup, explained: TextbookShares
     ) -> Iterator[Alternative]:
         """With the weight of the URDF added."""
         if not (setup.weightless or fit.robot.base_joints):

@@ -9,7 +9,7 @@ import numpy as np
 from excite_cli.checks.base import Alternative, Settings, SetupCheck
 from excite_cli.checks.joint_zero import offsets
 from excite_cli.checks.setup import Setup
-from excite_cli.checks.textbook_fit import Explained, TextbookFit
+from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
 from excite_cli.config.spec import Spec
 
 
@@ -19,7 +19,7 @@ class _Sign(SetupCheck):
     word: str
 
     def alternatives(
-        self, fit: TextbookFit, setup: Setup, explained: Explained
+        self, fit: TextbookFit, setup: Setup, explained: TextbookShares
     ) -> Iterator[Alternative]:
         """Every joint turned round, and all of them."""
         n = len(setup.zero)

@@ -6,7 +6,7 @@ import numpy as np
 
 from excite_cli.checks.base import Alternative, Settings, SetupCheck, descended
 from excite_cli.checks.setup import Setup
-from excite_cli.checks.textbook_fit import Explained, TextbookFit
+from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
 from excite_cli.config.spec import Spec
 
 _COARSE = np.radians([15.0, 45.0, 90.0, 135.0, 180.0, -135.0, -90.0, -45.0, -15.0])
@@ -23,7 +23,7 @@ class JointZero(SetupCheck):
     kind = "zero"
 
     def alternatives(
-        self, fit: TextbookFit, setup: Setup, explained: Explained
+        self, fit: TextbookFit, setup: Setup, explained: TextbookShares
     ) -> Iterator[Alternative]:
         """Angles all around."""
         for j in np.flatnonzero(~fit.robot.sliding).tolist():

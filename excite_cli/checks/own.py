@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import ClassVar
 
-from excite_cli.checks.result import Result
+from excite_cli.checks.check_result import CheckResult
 from excite_cli.config.spec import Spec
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.measurement.dataset import Run
@@ -37,7 +37,7 @@ class Check(ABC):
     name: ClassVar[str]
 
     @abstractmethod
-    def look(self, log: Log) -> Iterable[Result]:
+    def look(self, log: Log) -> Iterable[CheckResult]:
         """A doubt or a fault for all that is wrong; nothing where all is fine."""
 
 

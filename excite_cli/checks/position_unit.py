@@ -7,7 +7,7 @@ import numpy as np
 
 from excite_cli.checks.base import Alternative, Settings, SetupCheck
 from excite_cli.checks.setup import Setup
-from excite_cli.checks.textbook_fit import Explained, TextbookFit
+from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
 from excite_cli.config.spec import Spec
 from excite_cli.measurement.torque import RADIANS, angle_units
 
@@ -23,7 +23,7 @@ class PositionUnit(SetupCheck):
     kind = "angle"
 
     def alternatives(
-        self, fit: TextbookFit, setup: Setup, explained: Explained
+        self, fit: TextbookFit, setup: Setup, explained: TextbookShares
     ) -> Iterator[Alternative]:
         """Encoders of other numbers of bits; degrees and radians, of each joint too."""
         for factor in _TRIED:

@@ -11,8 +11,8 @@ from excite_cli.checks import (
     two_sides,
     zero_limits,
 )
+from excite_cli.checks.check_result import CheckResult, Status
 from excite_cli.checks.own import own_checks
-from excite_cli.checks.result import Result, Status
 from excite_cli.checks.set_up_search import CHECKS
 from excite_cli.checks.trust import but_trusted, is_trusted
 from excite_cli.config.spec import Spec
@@ -45,7 +45,7 @@ _SPEEDS = "measurement.channels"  # leaves recorded speeds out, which no fit nee
 _STATUS: dict[str, Status] = {"error": "fault", "warning": "doubt", "note": "ok"}
 
 
-def of_description(robot: Robot) -> list[Result]:
+def of_description(robot: Robot) -> list[CheckResult]:
     """Doubts and faults of the description alone."""
     return [
         *bodies.impossible_bodies(robot),
@@ -55,7 +55,7 @@ def of_description(robot: Robot) -> list[Result]:
     ]
 
 
-def of_files(findings: Sequence[Finding], spec: Spec) -> list[Result]:
+def of_files(findings: Sequence[Finding], spec: Spec) -> list[CheckResult]:
     """Results of what was seen while files were read; doubts of trusted checks are none.
 
     A doubt that asks for another config is open. A fault has a key of its own.
@@ -63,7 +63,7 @@ def of_files(findings: Sequence[Finding], spec: Spec) -> list[Result]:
     row = {kind: name for name, kinds in _OF_FILES.items() for kind in kinds}
     row |= {check.kind: check.name for check in CHECKS}
     found = [
-        Result(
+        CheckResult(
             row.get(each.kind, _OTHER), each.kind, _STATUS[each.severity], each.text, each.joints,
             each.run, each.settings,
             is_open=each.severity == "warning" and bool({*each.settings} - {_SPEEDS}),
@@ -79,14 +79,14 @@ def names() -> tuple[str, ...]:
     return (*NAMES, *(check.name for check in own_checks()))
 
 
-def in_order(found: Sequence[Result], judged: bool, spec: Spec) -> tuple[Result, ...]:
+def in_order(found: Sequence[CheckResult], judged: bool, spec: Spec) -> tuple[CheckResult, ...]:
     """Results by the order of rows; a row without any is fine, if it was `judged` or trusted."""
-    rows: list[Result] = []
+    rows: list[CheckResult] = []
     seen = {*_OF_DESCRIPTION, *_OF_FILES}  # trusted or not
     for name in (*names(), _OTHER):
         own = [each for each in found if each.name == name]
         if not own and (judged or name in _OF_DESCRIPTION) and name != _OTHER:
             is_judged = name in seen or not is_trusted(name, spec)
-            own = [Result(name, "", "ok", "" if is_judged else _TRUSTED)]
+            own = [CheckResult(name, "", "ok", "" if is_judged else _TRUSTED)]
         rows += own
     return tuple(rows)

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from excite_cli.checks.result import Result, Status
-from excite_cli.checks.set_up_search import Step
+from excite_cli.checks.check_result import CheckResult, Status
+from excite_cli.checks.set_up_search import SetUpMistake
 from excite_cli.checks.setup import Setup
-from excite_cli.checks.textbook_fit import Explained
+from excite_cli.checks.textbook_fit import TextbookShares
 from excite_cli.checks.trust import key_of
 from excite_cli.config.spec import Spec
 from excite_cli.measurement.dataset import Mask
@@ -19,10 +19,10 @@ _FOREIGN = 0.85  # torques of which this is left have nothing to do with the mot
 
 
 def of_steps(
-    steps: Sequence[Step], declared: Setup, names: Sequence[str], spec: Spec
-) -> list[Result]:
+    steps: Sequence[SetUpMistake], declared: Setup, names: Sequence[str], spec: Spec
+) -> list[CheckResult]:
     """One result for every check that has found steps, as one sentence."""
-    found: dict[str, list[Step]] = {}
+    found: dict[str, list[SetUpMistake]] = {}
     for step in steps:
         found.setdefault(step.check.name, []).append(step)
     told = {step.question for step in steps}
@@ -30,12 +30,12 @@ def of_steps(
 
 
 def _of_one_check(
-    steps: Sequence[Step],
+    steps: Sequence[SetUpMistake],
     told: set[tuple[str, tuple[int, ...], str]],
     declared: Setup,
     names: Sequence[str],
     spec: Spec,
-) -> Result:
+) -> CheckResult:
     """Keys hold all that was found of one thing: a mapping is written whole.
 
     What was as likely, and was `told` of another step, is true as well: no word of it.
@@ -69,15 +69,15 @@ def _of_one_check(
     named = joints or np.flatnonzero(shown).tolist()
     named_joints = tuple(names[j] for j in named)
     is_open = not all(step.check.has_effect(step.before, step.after.setup) for step in steps)
-    return Result(check.name, check.kind, status, text, named_joints, "", settings, is_open)
+    return CheckResult(check.name, check.kind, status, text, named_joints, "", settings, is_open)
 
 
-def _share(left: Explained, shown: Mask) -> float:
+def _share(left: TextbookShares, shown: Mask) -> float:
     """Root mean square share of what is left: of nothing more than all can be left."""
     return min(1.0, float(np.sqrt(np.mean(np.square(left.shares[shown])))))
 
 
-def no_set_up(names: Sequence[str], left: Explained) -> Result:
+def no_set_up(names: Sequence[str], left: TextbookShares) -> CheckResult:
     """Another set-up explains more, and none explains enough to be taken for true."""
     off = left.judged & (left.shares > _MUCH)
     text = (
@@ -86,10 +86,12 @@ def no_set_up(names: Sequence[str], left: Explained) -> Result:
         "coarse, torques another channel, or is it another robot's"
     )
     joints = tuple(np.array(names)[off].tolist())
-    return Result(BELONG, "foreign_torque", "doubt", text, joints, is_open=True)
+    return CheckResult(BELONG, "foreign_torque", "doubt", text, joints, is_open=True)
 
 
-def unexplained(left: Explained, names: Sequence[str], declared: Sequence[bool]) -> list[Result]:
+def unexplained(
+    left: TextbookShares, names: Sequence[str], declared: Sequence[bool]
+) -> list[CheckResult]:
     """Torques that do not belong to the motion, for a reason that cannot be named.
 
     A fault where they are those of most joints. Single joints may have effects as large: a doubt
@@ -109,7 +111,7 @@ def unexplained(left: Explained, names: Sequence[str], declared: Sequence[bool])
         f"are, say so: {written(key_of(BELONG))}"
     )
     joints = tuple(names[j] for j in np.flatnonzero(foreign).tolist())
-    return [Result(BELONG, "foreign_torque", status, text, joints, is_open=True)]
+    return [CheckResult(BELONG, "foreign_torque", status, text, joints, is_open=True)]
 
 
 def written(settings: Mapping[str, Any]) -> str:

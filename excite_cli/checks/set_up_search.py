@@ -20,7 +20,7 @@ from excite_cli.checks.joint_zero import JointZero
 from excite_cli.checks.position_unit import PositionUnit
 from excite_cli.checks.samples import Samples
 from excite_cli.checks.setup import Setup
-from excite_cli.checks.textbook_fit import FLOOR, Explained, TextbookFit
+from excite_cli.checks.textbook_fit import FLOOR, TextbookFit, TextbookShares
 from excite_cli.checks.time_scale import Clock, TorqueLag
 from excite_cli.checks.tool import Tool
 from excite_cli.checks.torque_unit import TorqueUnit
@@ -73,7 +73,7 @@ _Question = tuple[str, tuple[int, ...], str]  # check, joints, variant
 
 
 @dataclass(frozen=True)
-class Step:
+class SetUpMistake:
     """One mistake: whose it is, the set-up without and with it undone, how well the data fit.
 
     `rivals`: alternatives that explain about as much.
@@ -82,8 +82,8 @@ class Step:
     check: SetupCheck
     before: Setup
     after: Alternative
-    left_before: Explained
-    left_after: Explained
+    left_before: TextbookShares
+    left_after: TextbookShares
     rivals: "tuple[_Candidate, ...]" = ()
 
     @property
@@ -117,7 +117,7 @@ class _Candidate:
 
     check: SetupCheck
     alternative: Alternative
-    explained: Explained
+    explained: TextbookShares
 
     @property
     def cost(self) -> float:
@@ -129,7 +129,7 @@ class _Candidate:
         """What is set up: of one question there is one answer."""
         return self.check.name, self.alternative.joints, self.alternative.variant
 
-    def is_far_better(self, other: Explained) -> bool:
+    def is_far_better(self, other: TextbookShares) -> bool:
         """Whether it explains far more than another set-up."""
         gain = _gain(self.explained, other)
         shown = not self.check.of_all or np.mean(gain[other.judged] > _GAINS) >= _SHOWN
@@ -137,7 +137,7 @@ class _Candidate:
         return bool(self.cost < other.loss - _CLEAR and falls and shown)
 
 
-def mistakes(fit: TextbookFit, spec: Spec) -> list[Step]:
+def mistakes(fit: TextbookFit, spec: Spec) -> list[SetUpMistake]:
     """Mistakes, the one that explains most first, until none explains far more.
 
     What the config says of a joint itself is taken as it is. The first may have explained in part
@@ -154,7 +154,7 @@ def mistakes(fit: TextbookFit, spec: Spec) -> list[Step]:
     return min(found, others, key=lambda steps: _total(fit, steps))
 
 
-def _total(fit: TextbookFit, steps: Sequence[Step]) -> float:
+def _total(fit: TextbookFit, steps: Sequence[SetUpMistake]) -> float:
     """L of what several steps leave, and what each of them must gain."""
     left = steps[-1].left_after if steps else fit(Setup.as_declared(fit.robot))
     return left.loss + sum(_CLEAR + step.after.price for step in steps)
@@ -166,7 +166,7 @@ def _steps(
     spec: Spec,
     first: Sequence[_Candidate],
     never: _Question | None = None,
-) -> Iterator[Step]:
+) -> Iterator[SetUpMistake]:
     """Steps, each the best of its turn, without the answers to one question."""
     setup = Setup.as_declared(fit.robot)
     explained = fit(setup)
@@ -182,17 +182,19 @@ def _steps(
         same = [each for each in near if each.question == best.question]
         best = next((each for each in same if each.alternative.is_plain), best)
         rivals = [each for each in near if each not in same]
-        step = Step(best.check, setup, best.alternative, explained, best.explained, tuple(rivals))
+        step = SetUpMistake(
+            best.check, setup, best.alternative, explained, best.explained, tuple(rivals)
+        )
         yield step
         setup, explained = best.alternative.setup, best.explained
 
 
-def _gain(one: Explained, other: Explained) -> Array:
+def _gain(one: TextbookShares, other: TextbookShares) -> Array:
     return np.log(np.maximum(other.shares, FLOOR) / np.maximum(one.shares, FLOOR))
 
 
 def _candidates(
-    fit: TextbookFit, rough: TextbookFit, spec: Spec, setup: Setup, explained: Explained
+    fit: TextbookFit, rough: TextbookFit, spec: Spec, setup: Setup, explained: TextbookShares
 ) -> Iterator[_Candidate]:
     names, beyond = fit.robot.joint_names, beyond_limits(fit.robot, rough.samples, setup)
     for check in CHECKS:

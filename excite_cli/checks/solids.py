@@ -21,7 +21,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from excite_cli.checks.bodies import LinkBody, link_bodies
-from excite_cli.checks.result import Result, few
+from excite_cli.checks.check_result import CheckResult, few
 from excite_cli.errors import RobotError
 from excite_cli.geometry.link_shapes import collision_model, placed_shapes, visual_model
 from excite_cli.robot.mesh_paths import unusable, without_unusable
@@ -78,7 +78,7 @@ class _Solid:
         return float(np.sqrt(square) / np.linalg.norm((self.high - self.low) / 2))
 
 
-def misfit_solids(robot: Robot) -> list[Result]:
+def misfit_solids(robot: Robot) -> list[CheckResult]:
     """A doubt for each way in which masses do not fit the shapes."""
     groups = links_by_joint(robot)
     if not robot.floating:
@@ -170,7 +170,7 @@ def _frame_words(solid: _Solid) -> str:
 
 def _results(
     kind: str, solids: Sequence[_Solid], words: Callable[[_Solid], str], meant: str
-) -> list[Result]:
+) -> list[CheckResult]:
     """One doubt for all `solids`, with the figures of the heaviest; none without any."""
     if not solids:
         return []
@@ -182,4 +182,4 @@ def _results(
         "the description"
     )
     joints = tuple(dict.fromkeys(each.joint for each in solids if each.joint))
-    return [Result(NAME, kind, "doubt", text, joints)]
+    return [CheckResult(NAME, kind, "doubt", text, joints)]

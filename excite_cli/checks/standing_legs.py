@@ -10,7 +10,7 @@ from itertools import combinations
 import numpy as np
 from scipy.optimize import nnls
 
-from excite_cli.checks.result import Result
+from excite_cli.checks.check_result import CheckResult
 from excite_cli.checks.samples import Samples
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
@@ -23,7 +23,7 @@ _WEIGHT = 0.5, 1.5  # of the robot, that they carry together
 _MOST_FEET = 4
 
 
-def standing_legs(robot: Robot, samples: Samples) -> list[Result]:
+def standing_legs(robot: Robot, samples: Samples) -> list[CheckResult]:
     """A fault where torques are those of a robot that stands on links of its own."""
     ends = leaves(robot)
     if robot.base_joints or len(ends) < 2 or not samples.known.any():
@@ -56,7 +56,7 @@ def standing_legs(robot: Robot, samples: Samples) -> list[Result]:
         f"the joints that carry it out of robot.joints; measurement.trust: [{NAME}] takes them as "
         "they are"
     )
-    return [Result(NAME, "standing", "fault", text)]
+    return [CheckResult(NAME, "standing", "fault", text)]
 
 
 def _held(robot: Robot, samples: Samples, ends: tuple[int, ...]) -> Array:

@@ -49,7 +49,7 @@ _RIDGE = 1e-9  # of a column of X, whose norm is 1
 
 
 @dataclass(frozen=True)
-class Explained:
+class TextbookShares:
     """`shares` (n,) of the torques that are left, 1 where not `judged` (n,); `loss` L.
 
     `z` (r + 1,): by how many standard deviations bodies, and all torques, are others than the URDF
@@ -91,7 +91,7 @@ class TextbookFit:
         self._scale = loose * _SCALE
         self._basis = loose * _seen(robot, self.phi, spread.ravel())
 
-    def __call__(self, setup: Setup) -> Explained:
+    def __call__(self, setup: Setup) -> TextbookShares:
         """How well the data fit, set up so."""
         return self._fitted(setup, self.columns(setup), self.phi, self._basis_of(setup))
 
@@ -130,7 +130,7 @@ class TextbookFit:
         turned = [self.robot.with_gravity(axis) for axis in np.eye(3)]
         return np.stack([RigidBody(each, phi, q, rest, rest).load for each in turned], axis=-1)
 
-    def missed(self, setup: Setup, found: Explained) -> Array:
+    def missed(self, setup: Setup, found: TextbookShares) -> Array:
         """Shares (n,) of these torques that bodies and friction of other samples miss.
 
         `nan` where either has none that count.
@@ -146,7 +146,7 @@ class TextbookFit:
             shares[j] = np.sqrt(np.mean(left**2)) / max(float(np.std(torque[at, j])), 1e-9)
         return shares
 
-    def _fitted(self, setup: Setup, columns: Array, phi: Array, basis: Array) -> Explained:
+    def _fitted(self, setup: Setup, columns: Array, phi: Array, basis: Array) -> TextbookShares:
         bodies = (phi, basis, self._scale, self._floor)
         return _explained(columns, bodies, self._rows(setup), self.counted(setup))
 
@@ -191,7 +191,7 @@ def _explained(
     bodies: tuple[Array, Array, float, float],
     rows: tuple[Array, ...],
     counted: Mask,
-) -> Explained:
+) -> TextbookShares:
     """Of the `whole` torque, in shares of the recorded one: `rows` are v, a and these, (T, n)."""
     judged = np.count_nonzero(counted, axis=0) >= FEWEST
     phi, basis, scale, floor = bodies
@@ -213,7 +213,7 @@ def _explained(
     shares, z = np.ones(counted.shape[1]), np.zeros(basis.shape[1] + 1)
     coefficients = np.zeros((len(shares), _PASSIVE))
     if not grams:
-        return Explained(shares, judged, 0.0, z, coefficients)
+        return TextbookShares(shares, judged, 0.0, z, coefficients)
     products = _Products(np.array(grams), len(z))
     s = np.full(len(grams), _FIRST)
     for _ in range(_ROUNDS):
@@ -223,7 +223,7 @@ def _explained(
         if np.abs(np.log(s / before)).max() < _SETTLED:
             break
     coefficients[judged] = follows * np.array(scales)
-    return Explained(shares, judged, float(np.log(s).sum() + 0.5 * z @ z), z, coefficients)
+    return TextbookShares(shares, judged, float(np.log(s).sum() + 0.5 * z @ z), z, coefficients)
 
 
 class _Products:

@@ -12,7 +12,7 @@ import numpy as np
 from excite_cli.checks.base import Alternative, Settings, SetupCheck, descended
 from excite_cli.checks.samples import LAGS
 from excite_cli.checks.setup import Setup
-from excite_cli.checks.textbook_fit import Explained, TextbookFit
+from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
 from excite_cli.config.spec import Spec
 
 _CLOCKS = (0.25, 0.5, 0.7, 0.85, 0.93, 1.07, 1.18, 1.4, 2.0, 4.0)
@@ -28,7 +28,7 @@ class Clock(SetupCheck):
     kind = "clock"
 
     def alternatives(
-        self, fit: TextbookFit, setup: Setup, explained: Explained
+        self, fit: TextbookFit, setup: Setup, explained: TextbookShares
     ) -> Iterator[Alternative]:
         """Seconds that last a quarter to four times as long."""
         if not fit.samples.clocked:
@@ -68,7 +68,7 @@ class TorqueLag(SetupCheck):
     of_all = True
 
     def alternatives(
-        self, fit: TextbookFit, setup: Setup, explained: Explained
+        self, fit: TextbookFit, setup: Setup, explained: TextbookShares
     ) -> Iterator[Alternative]:
         """Up to a tenth of a second, both ways."""
         for lag in LAGS:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from excite_cli.checks.base import Alternative, Settings, SetupCheck
 from excite_cli.checks.setup import Setup
-from excite_cli.checks.textbook_fit import Explained, TextbookFit
+from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
 from excite_cli.config.spec import Spec
 
 _PRICE = 2.0  # in L: ten numbers more; a sound UR10 gains 1.9 by them, one with 2 kg more than 3
@@ -19,7 +19,7 @@ class Tool(SetupCheck):
     is_physical = True
 
     def alternatives(
-        self, fit: TextbookFit, setup: Setup, explained: Explained
+        self, fit: TextbookFit, setup: Setup, explained: TextbookShares
     ) -> Iterator[Alternative]:
         """Nearly any body in place of each last one."""
         parents = set(fit.robot.model.parents)

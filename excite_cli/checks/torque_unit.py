@@ -11,7 +11,7 @@ import numpy as np
 
 from excite_cli.checks.base import Alternative, Settings, SetupCheck, descended
 from excite_cli.checks.setup import Setup
-from excite_cli.checks.textbook_fit import Explained, TextbookFit
+from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
 from excite_cli.config.spec import Spec
 from excite_cli.measurement.torque import NEWTON_METERS, torque_units
 
@@ -33,7 +33,7 @@ class TorqueUnit(SetupCheck):
     kind = "torque_scale"
 
     def alternatives(
-        self, fit: TextbookFit, setup: Setup, explained: Explained
+        self, fit: TextbookFit, setup: Setup, explained: TextbookShares
     ) -> Iterator[Alternative]:
         """Decades, of every joint and of all."""
         n = len(setup.zero)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from excite_cli.checks.result import Result
+from excite_cli.checks.check_result import CheckResult
 from excite_cli.config.spec import Spec
 from excite_cli.errors import ConfigError, nearest
 
@@ -22,7 +22,7 @@ def is_trusted(name: str, spec: Spec) -> bool:
     return isinstance(spec.measurement.trust, tuple) and name in spec.measurement.trust
 
 
-def but_trusted(found: Iterable[Result], spec: Spec) -> list[Result]:
+def but_trusted(found: Iterable[CheckResult], spec: Spec) -> list[CheckResult]:
     """Results, of which those of checks that are trusted are fine and change no config."""
     return [
         replace(

@@ -10,7 +10,7 @@ import re
 import numpy as np
 
 from excite_cli.checks.bodies import LinkBody, link_bodies
-from excite_cli.checks.result import Result, few
+from excite_cli.checks.check_result import CheckResult, few
 from excite_cli.robot.model import Robot
 
 NAME = "left-right symmetry"
@@ -24,7 +24,7 @@ _RIGHT = {"left": "right", "l": "r"}
 _RIGHT_LEG = {"fl": "fr", "rl": "rr", "hl": "hr", "bl": "br", "lf": "rf", "lh": "rh"}
 
 
-def unequal_halves(robot: Robot) -> list[Result]:
+def unequal_halves(robot: Robot) -> list[CheckResult]:
     """One doubt for all pairs whose masses or inertias differ by more than half."""
     bodies = {body.name: body for body in link_bodies(robot)}
     least = _COUNTS * sum(body.mass for body in bodies.values())
@@ -39,7 +39,7 @@ def unequal_halves(robot: Robot) -> list[Result]:
         f"{few(told, '; ')}. Which side is right? Correct the other in the description, if the "
         "robot's two sides are alike"
     )
-    return [Result(NAME, "unequal_halves", "doubt", text)]
+    return [CheckResult(NAME, "unequal_halves", "doubt", text)]
 
 
 def _mirrored(name: str) -> list[str]:

@@ -9,14 +9,14 @@ import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 
-from excite_cli.checks.result import Result, few
+from excite_cli.checks.check_result import CheckResult, few
 from excite_cli.robot.model import Robot
 
 NAME = "limits of the description"
 _WRITTEN = (".urdf", ".xacro")  # MJCF has no limits of speed, SDF may leave them out
 
 
-def zero_limits(robot: Robot) -> list[Result]:
+def zero_limits(robot: Robot) -> list[CheckResult]:
     """A doubt for speeds, and one for efforts, that the config does not give in their place."""
     if robot.description.path.suffix not in _WRITTEN:
         return []
@@ -35,5 +35,5 @@ def zero_limits(robot: Robot) -> list[Result]:
                 f"the description limits the {key} of {few(zero)} to 0, which is taken as no "
                 f"limit. Give what the data sheet says: robot.limits.{zero[0]}.{key}"
             )
-            found.append(Result(NAME, f"zero_{key}", "doubt", text, tuple(zero)))
+            found.append(CheckResult(NAME, f"zero_{key}", "doubt", text, tuple(zero)))
     return found

@@ -13,7 +13,7 @@ from excite_cli.cli.compare import compare
 from excite_cli.cli.compare_random import compare_random
 from excite_cli.cli.console import told_warnings
 from excite_cli.cli.diagnose import diagnose
-from excite_cli.cli.ending import INTERRUPTED, run_guarded
+from excite_cli.cli.exit_status import INTERRUPTED, run_guarded
 from excite_cli.cli.export import export
 from excite_cli.cli.help_page import HelpfulCommand, HelpfulGroup, split_docstring
 from excite_cli.cli.identify import identify

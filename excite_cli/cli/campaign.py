@@ -145,7 +145,13 @@ def campaign(
       excite campaign ur10.yaml --inbox to_the_robot --log .h5
       excite campaign ur10.yaml --measure simulate --effect spring@elbow_joint=15
     """
-    from excite_cli.api.campaigning import MODEL, PAGE, Asked, campaign_answer, run_campaign
+    from excite_cli.api.campaigning import (
+        MODEL,
+        PAGE,
+        CampaignOptions,
+        campaign_answer,
+        run_campaign,
+    )
     from excite_cli.api.loading import load_case
     from excite_cli.api.working import single_threaded, working
     from excite_cli.cli.measured_by import measured_by
@@ -159,7 +165,7 @@ def campaign(
         )
     if measure != "simulate" and (effect or inertia_error != 0.2):
         raise ConfigError("--effect and --inertia-error belong to --measure simulate.")
-    asked = Asked(from_speed, max_rounds, max_seconds, not no_entry, plain)
+    asked = CampaignOptions(from_speed, max_rounds, max_seconds, not no_entry, plain)
     with (
         single_threaded(),
         working(workers, scheduler, 1, terminal.tell) as place,

@@ -10,7 +10,7 @@ import typer
 from excite_cli.errors import RobotError, nearest
 
 if TYPE_CHECKING:
-    from excite_cli.api.proposing import Allow, Needed
+    from excite_cli.api.proposing import Allow, FolderRequest
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ def may_read(allow_found: bool, at_terminal: bool) -> "Allow":
     """
     answers: dict[str, bool] = {}
 
-    def allow(needed: "Needed") -> bool:
+    def allow(needed: "FolderRequest") -> bool:
         if (allow_found and needed.near) or not at_terminal:
             return allow_found and needed.near
         if str(needed) not in answers:

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from excite_cli.api.campaigning import Command, Inbox, Measure, Simulated, SimulationSettings
+from excite_cli.api.campaigning import Inbox, Measure, MeasureCommand, Simulated, SimulationSettings
 from excite_cli.api.loading import Case
 from excite_cli.api.showing import Tell, saying
 
@@ -24,4 +24,4 @@ def measured_by(
     if measure == "simulate":
         settings = SimulationSettings(seed=case.spec.seed, inertia_error=inertia_error)
         return Simulated(case, effects, settings)
-    return Command.of(measure, suffix, limit, tell)
+    return MeasureCommand.of(measure, suffix, limit, tell)

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from excite_cli.api.planning import most_motions
-from excite_cli.api.showing import Measure, figure_in_words
+from excite_cli.api.showing import ProgressMeasure, figure_in_words
 from excite_cli.cli.console import Line
 from excite_cli.config.spec import Spec
 
@@ -26,7 +26,7 @@ class Best:
     def words(self, progress: "Progress") -> str:
         """`condition number 5.48 (best 5.31)`; another figure is reported as it is."""
         figure = progress.figure
-        if figure.measure is not Measure.CONDITION_NUMBER:
+        if figure.measure is not ProgressMeasure.CONDITION_NUMBER:
             return figure_in_words(figure)
         if progress.worst_margin >= 0.0:
             self._best = min(self._best, figure.value)

@@ -11,7 +11,7 @@ numerator and mass are linear in φ (`dynamics.least_ratio`).
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
-from excite_cli.constraints.drawing import Drawing, GroundRegion
+from excite_cli.constraints.drawing import ConstraintScene, GroundRegion
 from excite_cli.constraints.support_polygon import Support, support_polygon
 from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.forward_kinematics import States
@@ -96,9 +96,9 @@ class Balance(Constraint):
         return cls(robot, support.normals, support.offsets, support.center, uncertainty)
 
     @property
-    def drawing(self) -> Drawing:
+    def drawing(self) -> ConstraintScene:
         """The region that the centre of mass is kept in."""
-        return Drawing(region=GroundRegion(self.normals, self.offsets))
+        return ConstraintScene(region=GroundRegion(self.normals, self.offsets))
 
     def margins(self, states: States) -> Array:
         """Distance of the centre of mass to each edge, inwards (T, m) [m]."""

@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.constraints.drawing import Drawing, Nearest
+from excite_cli.constraints.drawing import ConstraintScene, NearestBodies
 from excite_cli.constraints.joint_columns import JointColumns
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
@@ -120,11 +120,11 @@ class Constraint(ABC):
         return ()
 
     @property
-    def drawing(self) -> Drawing:
+    def drawing(self) -> ConstraintScene:
         """What of it can be drawn, at rest."""
-        return Drawing()
+        return ConstraintScene()
 
-    def nearest(self, poses: Poses, margins: Array) -> Nearest | None:
+    def nearest(self, poses: Poses, margins: Array) -> NearestBodies | None:
         """The nearest two bodies at poses with these margins (T, m); None without `drawing`s."""
         return None
 

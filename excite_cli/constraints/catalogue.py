@@ -21,7 +21,7 @@ from excite_cli.config.constraints_spec import (
 )
 from excite_cli.constraints.balance import Balance
 from excite_cli.constraints.base import Array, Constraint
-from excite_cli.constraints.ground_contact import Contact, Ground, ZeroMomentPoint
+from excite_cli.constraints.ground_contact import Ground, GroundContact, ZeroMomentPoint
 from excite_cli.constraints.joint_bound import JointBound
 from excite_cli.constraints.joint_torque import JointTorque
 from excite_cli.constraints.keep_out import build_keep_out
@@ -217,7 +217,7 @@ def _contact(spec: ContactSpec, setting: Setting) -> Iterable[Constraint]:
         center = support.center
     if center is None:
         center = posture_center_of_mass(robot)
-    found.append(Contact(ground, center, spec.friction, spec.torsion, spec.min_load))
+    found.append(GroundContact(ground, center, spec.friction, spec.torsion, spec.min_load))
     return found
 
 

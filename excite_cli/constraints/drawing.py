@@ -25,7 +25,7 @@ class GroundRegion:
 
 
 @dataclass(frozen=True, eq=False)
-class Drawing:
+class ConstraintScene:
     """What is there at all times: bodies that distances are taken of, obstacles, a region."""
 
     capsules: tuple[Capsule, ...] = ()
@@ -34,7 +34,7 @@ class Drawing:
 
 
 @dataclass(frozen=True, eq=False)
-class Nearest:
+class NearestBodies:
     """The nearest two bodies at each of T instants, of the robot or one of them an obstacle.
 
     distances (T,) [m], negative where they overlap; ends (T, 2, 3) [m], the points between which

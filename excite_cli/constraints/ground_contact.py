@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
-from excite_cli.constraints.drawing import Drawing, GroundRegion
+from excite_cli.constraints.drawing import ConstraintScene, GroundRegion
 from excite_cli.constraints.support_polygon import Support
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.dynamics.least_ratio import Ratios, least_ratios, least_values, worst_inertias
@@ -93,10 +93,10 @@ class ZeroMomentPoint(Constraint):
         self.uncertainty = ground.admitted(self.functionals)
 
     @property
-    def drawing(self) -> Drawing:
+    def drawing(self) -> ConstraintScene:
         """The support, at the height of the ground."""
         edges = self.support.normals, self.support.offsets
-        return Drawing(region=GroundRegion(*edges, self.height, self.contacts))
+        return ConstraintScene(region=GroundRegion(*edges, self.height, self.contacts))
 
     def ground_point(self, states: States) -> Array:
         """The zero-moment point with the inertias of the URDF."""
@@ -141,7 +141,7 @@ class ZeroMomentPoint(Constraint):
         return self._last[1]
 
 
-class Contact(Constraint):
+class GroundContact(Constraint):
     """Friction, torsion and load: functionals·W ≥ `least_values`, (m, 6) on [f; n] and (m,)."""
 
     uncertainty: InertiaUncertainty

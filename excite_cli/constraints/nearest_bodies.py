@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.constraints.drawing import Nearest
+from excite_cli.constraints.drawing import NearestBodies
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.geometry.obstacles import Obstacle
 from excite_cli.geometry.world_segments import nearest_points, normals
@@ -22,7 +22,7 @@ def nearest_capsules(
     labels: Sequence[str],
     capsules: Sequence[Capsule],
     pairs: Pairs,
-) -> Nearest:
+) -> NearestBodies:
     """Of pairs of capsules by their indices, with their distances (T, P) [m] at the poses."""
 
     def ends(instant: int, column: int) -> Ends:
@@ -46,7 +46,7 @@ def nearest_obstacles(
     capsules: Sequence[Capsule],
     obstacles: Sequence[Obstacle],
     pairs: Pairs,
-) -> Nearest:
+) -> NearestBodies:
     """Of pairs (capsule, obstacle) by their indices, with their distances (T, P) [m]."""
 
     def ends(instant: int, column: int) -> Ends:
@@ -65,9 +65,9 @@ def _nearest(
     labels: Sequence[str],
     bodies: Sequence[tuple[Capsule, ...]],
     ends: Callable[[int, int], Ends],
-) -> Nearest:
+) -> NearestBodies:
     columns = distances.argmin(axis=1).tolist()
-    return Nearest(
+    return NearestBodies(
         distances[np.arange(len(distances)), columns],
         np.array([ends(t, column) for t, column in enumerate(columns)]).reshape(-1, 2, 3),
         tuple(bodies[column] for column in columns),

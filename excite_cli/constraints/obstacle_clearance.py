@@ -3,7 +3,7 @@
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
-from excite_cli.constraints.drawing import Drawing, Nearest
+from excite_cli.constraints.drawing import ConstraintScene, NearestBodies
 from excite_cli.constraints.nearest_bodies import nearest_obstacles
 from excite_cli.constraints.remark import counted_reasons
 from excite_cli.dynamics.forward_kinematics import States
@@ -92,11 +92,11 @@ class Surroundings(Constraint):
         return tuple(said)
 
     @property
-    def drawing(self) -> Drawing:
+    def drawing(self) -> ConstraintScene:
         """All capsules and all obstacles."""
-        return Drawing(self.capsules, self.obstacles)
+        return ConstraintScene(self.capsules, self.obstacles)
 
-    def nearest(self, poses: Poses, margins: Array) -> Nearest:
+    def nearest(self, poses: Poses, margins: Array) -> NearestBodies:
         """The nearest capsule and obstacle."""
         distances, bodies = margins + self.pairs.kept, (self.capsules, self.obstacles)
         return nearest_obstacles(poses, distances, self.labels, *bodies, self.pairs.checked)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from excite_cli.constraints.base import Array, Constraint, Indices
-from excite_cli.constraints.drawing import Drawing, Nearest
+from excite_cli.constraints.drawing import ConstraintScene, NearestBodies
 from excite_cli.constraints.nearest_bodies import nearest_capsules
 from excite_cli.constraints.remark import counted_reasons
 from excite_cli.dynamics.forward_kinematics import States
@@ -96,11 +96,11 @@ class SelfCollision(Constraint):
         return count, Note(Level.WARNING, warning)
 
     @property
-    def drawing(self) -> Drawing:
+    def drawing(self) -> ConstraintScene:
         """All capsules."""
-        return Drawing(self.capsules)
+        return ConstraintScene(self.capsules)
 
-    def nearest(self, poses: Poses, margins: Array) -> Nearest:
+    def nearest(self, poses: Poses, margins: Array) -> NearestBodies:
         """The nearest pair of capsules."""
         checked, distances = self.pairs.checked, margins + self.margin
         return nearest_capsules(poses, distances, self.labels, self.capsules, checked)

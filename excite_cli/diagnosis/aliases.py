@@ -21,8 +21,8 @@ import numpy as np
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.judgement import Judgement
-from excite_cli.diagnosis.modelled_run import Model
-from excite_cli.diagnosis.records import Absorbed
+from excite_cli.diagnosis.modelled_run import DeclaredModel
+from excite_cli.diagnosis.records import ConfoundedCandidate
 from excite_cli.diagnosis.schur import ABSORBED, SHARED, Schur
 from excite_cli.effects.base import Effect
 from excite_cli.effects.place import Place
@@ -35,8 +35,8 @@ _WORTH_NAMING = 0.15
 
 
 def absorbed_effects(
-    evidence: Evidence, candidates: Sequence[Candidate], chosen: Sequence[int], model: Model
-) -> tuple[Absorbed, ...]:
+    evidence: Evidence, candidates: Sequence[Candidate], chosen: Sequence[int], model: DeclaredModel
+) -> tuple[ConfoundedCandidate, ...]:
     """Candidates of which the model leaves less than 0.1 % of their energy, and scales tell none.
 
     The model is the declared one with the chosen effects, which are named by their own parameters.
@@ -48,7 +48,7 @@ def absorbed_effects(
         evidence = evidence.without_prior
     at, joint_names = evidence.columns(chosen), model.robot.joint_names
     factor, schur = evidence.factor(chosen), evidence.schur(chosen)
-    found: dict[Place, Absorbed] = {}
+    found: dict[Place, ConfoundedCandidate] = {}
     effects = [candidates[i].effect for i in chosen]
     taken = {effect.place for effect in effects}
     names = [model.base.names[k] for k in model.base.selection]
@@ -71,7 +71,9 @@ def absorbed_effects(
         order = np.argsort(-weight)
         by = [names[k] for k in order[:_NAMED] if weight[k] > _WORTH_NAMING * weight.max()]
         joints = tuple(joint_names[j] for j in c.effect.joints)
-        found[c.place] = Absorbed(c.effect.kind, joints, tuple(by), float(max(left, 0.0) / own))
+        found[c.place] = ConfoundedCandidate(
+            c.effect.kind, joints, tuple(by), float(max(left, 0.0) / own)
+        )
     return tuple(found.values())
 
 

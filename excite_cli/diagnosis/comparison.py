@@ -57,7 +57,7 @@ class Difference:
         return self.size / (2 * self.blocks * self.joints)
 
 
-class Comparison:
+class ModelComparison:
     """Compares models of some candidates on the filtered torque."""
 
     def __init__(

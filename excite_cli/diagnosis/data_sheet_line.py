@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from excite_cli.diagnosis.final_fit import FinalFit
-from excite_cli.diagnosis.held_out_errors import Played
+from excite_cli.diagnosis.held_out_errors import HeldOutRuns
 from excite_cli.diagnosis.held_out_verdict import worth_beside
 from excite_cli.diagnosis.modelled_run import places_of
 from excite_cli.diagnosis.records import FrictionLine, by_joint
@@ -37,7 +37,7 @@ def data_sheet_lines(traced: SearchResult, final: FinalFit) -> tuple[FrictionLin
 
 def with_worth(
     lines: Sequence[FrictionLine],
-    held: Played,
+    held: HeldOutRuns,
     traced: SearchResult,
     with_all: Sequence[Prediction],
     taken_off: Mapping[int, Array],

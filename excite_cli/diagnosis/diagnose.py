@@ -12,14 +12,14 @@ from excite_cli.checks.all_checks import findings_of
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.aliases import absorbed_effects, joint_aliases, other_name
 from excite_cli.diagnosis.candidates import record_of
-from excite_cli.diagnosis.comparison import Comparison
+from excite_cli.diagnosis.comparison import ModelComparison
 from excite_cli.diagnosis.data_sheet_line import data_sheet_lines, with_worth
 from excite_cli.diagnosis.effect_trace import effect_traces
-from excite_cli.diagnosis.excess_residual import large_rests
+from excite_cli.diagnosis.excess_residual import excess_residuals
 from excite_cli.diagnosis.final_fit import final_fit, regression, signal_to_error
 from excite_cli.diagnosis.held_out_errors import (
     INERTIAS,
-    Played,
+    HeldOutRuns,
     both_models,
     error_parts,
     held_out_errors,
@@ -27,7 +27,7 @@ from excite_cli.diagnosis.held_out_errors import (
 )
 from excite_cli.diagnosis.held_out_verdict import worth_on_held_out
 from excite_cli.diagnosis.misspecification import approximations
-from excite_cli.diagnosis.modelled_run import Model, ModelledRun
+from excite_cli.diagnosis.modelled_run import DeclaredModel, ModelledRun
 from excite_cli.diagnosis.naming import information_of, named_effects, rounds_of
 from excite_cli.diagnosis.own_torque import at_its_own_torque
 from excite_cli.diagnosis.records import (
@@ -152,19 +152,19 @@ def diagnose(
     final = final_fit(traced, regression(traced))
     floor = noise_floor(parts.training, processing)
     models = both_models(traced, final.parameters)
-    trained = Played(robot, traced.data.runs)
+    trained = HeldOutRuns(robot, traced.data.runs)
     before, after = map(trained.predictions, models)
     torques = [each.torque for each in after]
     left = traced.data.residuals(traced.candidates, traced.chosen, final.parameters)
-    rests, dependence = large_rests(traced, torques, left, parts.training, processing, floor)
+    rests, dependence = excess_residuals(traced, torques, left, parts.training, processing, floor)
     doubts = approximations(traced, robot.joint_names, rests)
-    played = Played(robot, kept)
+    played = HeldOutRuns(robot, kept)
     told, by_urdf = [played.predictions(each) for each in models], played.by_urdf
     from_urdf = spec.identification.inertias == "cad" and bool(by_urdf)
     begin = by_urdf if from_urdf else told[0]
     errors = held_out_errors(played, traced, models[1], begin, told[1], from_urdf)
     taken_off = error_parts(traced, errors)
-    held = Played(robot, [*kept, *prepare_all(parts.ends, processing)])
+    held = HeldOutRuns(robot, [*kept, *prepare_all(parts.ends, processing)])
     with_all = held.predictions(models[1])
     missed = compared.missed if compared else None
     if is_open:
@@ -221,7 +221,7 @@ def diagnose(
         textbook=_textbook(book, traced, played) if book is not None else None,
         skeleton=skeleton_of(robot),
         recorded=recorded(dataset),
-        large_rests=rests,
+        excess_residuals=rests,
         joint_aliases=_joint_aliases(traced, doubts),
         trained=trained.errors(after),
         inertia_names=standard_parameter_names(robot),
@@ -235,7 +235,7 @@ def _records(fitted: IdentifiedModel, robot: Robot) -> tuple[EffectRecord, ...]:
     return tuple(record_of(each, robot.joint_names, values) for each, values in fitted.by_effect)
 
 
-def _textbook(book: Sequence[int], traced: SearchResult, played: Played) -> Textbook:
+def _textbook(book: Sequence[int], traced: SearchResult, played: HeldOutRuns) -> Textbook:
     """Its effects beside the declared ones, and its error on the held-out data."""
     fitted = refitted(traced, book)
     added = _records(fitted, played.robot)[len(traced.model.declared) :]
@@ -251,7 +251,7 @@ def _prepared(spec: Spec, parts: Split) -> tuple[Processing, list[PreparedRun]]:
 
 
 def _traced(
-    model: Model,
+    model: DeclaredModel,
     spec: Spec,
     parts: Split,
     processing: Processing,
@@ -273,7 +273,7 @@ def _traced(
 
 def _needed(
     traced: SearchResult, bodies: Sequence[ModelledRun], spec: Spec
-) -> tuple[SearchResult, list[int] | None, Comparison | None]:
+) -> tuple[SearchResult, list[int] | None, ModelComparison | None]:
     """The answer of what was found, the textbook's candidates, and how models compare.
 
     Not where nothing is looked for, nor where something was weighed: then None.
@@ -319,7 +319,11 @@ def _noticed(
 
 
 def _filter_bias(
-    model: Model, after: IdentifiedModel, spec: Spec, runs: Sequence[Run], processing: Processing
+    model: DeclaredModel,
+    after: IdentifiedModel,
+    spec: Spec,
+    runs: Sequence[Run],
+    processing: Processing,
 ) -> tuple[Finding, ...]:
     """Whether the filter that was set biases the model that was found."""
     rows, more = model.scales, len(after.values) - model.declared_width
@@ -352,13 +356,13 @@ def _joint_aliases(
     )
 
 
-def _model(robot: Robot, base: BaseParameters, spec: Spec) -> Model:
+def _model(robot: Robot, base: BaseParameters, spec: Spec) -> DeclaredModel:
     declared = declared_effects(spec.effects, robot)
     known = weighed(spec.identification, declared, robot, base)
     rows = np.column_stack([known.rows, known.target])
     prior = prior_of(spec.identification, robot, len(rows) > 0)
     vague = prior is not None and spec.identification.inertias != "cad"
-    return Model(robot, base, known.effects, prior, spec.runs, rows, vague)
+    return DeclaredModel(robot, base, known.effects, prior, spec.runs, rows, vague)
 
 
 def _choices(

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from excite_cli.diagnosis.noise_spectrum import band_noise
-from excite_cli.diagnosis.records import LargeRest
+from excite_cli.diagnosis.records import ExcessResidual
 from excite_cli.diagnosis.residual_predictability import Quantities, Structure
 from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.diagnosis.traces import Dependence
@@ -32,14 +32,14 @@ _UNKNOWN = 0.003  # of the torque's RMS: a word where noise is not known
 _SMALLEST = 1e-3  # of the torque's RMS: what is smaller needs no word
 
 
-def large_rests(
+def excess_residuals(
     traced: SearchResult,
     predicted: Sequence[Array],
     residuals: Sequence[Array],
     recorded: Sequence[Run],
     processing: Processing,
     repeated: NoiseFloor | None,
-) -> tuple[tuple[LargeRest, ...], Dependence]:
+) -> tuple[tuple[ExcessResidual, ...], Dependence]:
     """Joints of whose torque more is left than noise in the training parts; on what it depends.
 
     predicted: torque (T, n) of the model at the working rate; residuals: (M, n) of what fits count;
@@ -79,7 +79,7 @@ def large_rests(
         structure = Structure(0.0) if rest is None or at_reversals else rest.structure()
         size = around if at_reversals else rms
         found.append(
-            LargeRest(
+            ExcessResidual(
                 joint=name,
                 rms=size,
                 share_of_torque=size / torque,

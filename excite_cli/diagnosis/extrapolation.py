@@ -12,7 +12,7 @@ import numpy as np
 
 from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.modelled_run import Model
+from excite_cli.diagnosis.modelled_run import DeclaredModel
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
@@ -62,7 +62,7 @@ class UsualMotion:
         body = RigidBody(robot, phi, q, v, a)
         self.signals = Signals(t, q, v, a, body.load, body.load, body)
 
-    def gram(self, model: Model, effects: Sequence[Effect]) -> Array:
+    def gram(self, model: DeclaredModel, effects: Sequence[Effect]) -> Array:
         """Mean over time (n, k, k) of products of the columns of every joint.
 
         [base parameters | declared effects | effects]; of what is in some runs only, or follows

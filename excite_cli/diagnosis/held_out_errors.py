@@ -39,7 +39,7 @@ from excite_cli.workers.context import each
 
 
 @dataclass(frozen=True)
-class Played:
+class HeldOutRuns:
     """Runs that models are tried on."""
 
     robot: Robot
@@ -102,7 +102,7 @@ _MODELS, _ORDERS = 1500, 100
 
 
 def held_out_errors(
-    played: Played,
+    played: HeldOutRuns,
     traced: SearchResult,
     after: IdentifiedModel,
     first: Sequence[Prediction],
@@ -173,7 +173,7 @@ class HeldOutErrors:
 
 
 def _grams(
-    played: Played,
+    played: HeldOutRuns,
     fit: _Fit,
     after: IdentifiedModel,
     first: Sequence[Prediction],

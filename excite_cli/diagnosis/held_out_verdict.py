@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from excite_cli.diagnosis import rules
-from excite_cli.diagnosis.held_out_errors import Played, refitted
-from excite_cli.diagnosis.records import Removed
+from excite_cli.diagnosis.held_out_errors import HeldOutRuns, refitted
+from excite_cli.diagnosis.records import ErrorReduction
 from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.diagnosis.textbook import everyday
 from excite_cli.diagnosis.verdict import HeldOutVerdict
@@ -39,11 +39,11 @@ class Worth:
     """The verdict on an effect, and by how much it lowers the error, per joint where it does."""
 
     verdict: HeldOutVerdict
-    removes: dict[str, Removed]
+    removes: dict[str, ErrorReduction]
 
 
 def worth_on_held_out(
-    held: Played,
+    held: HeldOutRuns,
     traced: SearchResult,
     with_all: Sequence[Prediction],
     sizes: Mapping[int, float],
@@ -77,7 +77,7 @@ def worth_on_held_out(
 
 
 def worth_beside(
-    held: Played,
+    held: HeldOutRuns,
     traced: SearchResult,
     with_all: Sequence[Prediction],
     rest: Sequence[int],
@@ -160,13 +160,13 @@ def _moving_sums(
     return wrong, size
 
 
-def _removes(without: Errors, with_it: Errors) -> dict[str, Removed]:
+def _removes(without: Errors, with_it: Errors) -> dict[str, ErrorReduction]:
     """What is removed on every joint on which it is not nil."""
     found = {}
     for joint, relative in with_it.relative.items():
         less = without.relative[joint] - relative
         if abs(less) > _NIL:
-            found[joint] = Removed(
+            found[joint] = ErrorReduction(
                 less,
                 without.relative_moving[joint] - with_it.relative_moving[joint],
                 without.rms[joint] - with_it.rms[joint],

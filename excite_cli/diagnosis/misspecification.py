@@ -26,10 +26,10 @@ import numpy as np
 from scipy.stats import chi2
 
 from excite_cli.diagnosis.covariate import Covariate
-from excite_cli.diagnosis.records import Approximation, LargeRest
+from excite_cli.diagnosis.records import Approximation, ExcessResidual
 from excite_cli.diagnosis.schur import SHARED
 from excite_cli.diagnosis.search_loop import SearchResult
-from excite_cli.diagnosis.training import Columns, Shown
+from excite_cli.diagnosis.training import Columns, PartColumns
 from excite_cli.effects.base import Effect, Tier
 
 # Curves without a name that a flexible effect comes near.
@@ -59,7 +59,7 @@ def curves_in_place(traced: SearchResult, joint_names: Sequence[str]) -> dict[in
             for run, part in zip(traced.data.runs, parts, strict=True)
             if part is not None
         )
-        if _does_as_well(traced, like, Shown(own.rows, columns)):
+        if _does_as_well(traced, like, PartColumns(own.rows, columns)):
             found |= dict.fromkeys(like, of)
     return found
 
@@ -75,7 +75,7 @@ def functions_alike(traced: SearchResult, i: int) -> list[int]:
     ]
 
 
-def _does_as_well(traced: SearchResult, like: Sequence[int], curve: Shown) -> bool:
+def _does_as_well(traced: SearchResult, like: Sequence[int], curve: PartColumns) -> bool:
     pool: list[Columns] = [*(traced.candidates[i] for i in traced.chosen), curve]
     white = traced.data.evidence(pool, traced.noise)
     every = range(len(traced.chosen))
@@ -103,7 +103,7 @@ _TRIED = 12  # of the strongest candidates of a joint
 def approximations(
     traced: SearchResult,
     joint_names: Sequence[str],
-    rests: Sequence[LargeRest],
+    rests: Sequence[ExcessResidual],
 ) -> dict[int, Approximation]:
     """Which chosen candidates are approximations, and of what."""
     more = {each.joint: each for each in rests if each.certain}
@@ -135,7 +135,7 @@ def approximations(
 
 
 def _is_outdone(
-    traced: SearchResult, i: int, rest: LargeRest, explained: float, joint_names: Sequence[str]
+    traced: SearchResult, i: int, rest: ExcessResidual, explained: float, joint_names: Sequence[str]
 ) -> bool:
     """Whether what is left says more than candidate i, whose E is given in units of the rest."""
     same = _same_quantity(traced, i, rest.depends_on, joint_names)
@@ -198,7 +198,7 @@ def _means_of_curves(
     return means
 
 
-def _of_its_own(traced: SearchResult, i: int, rest: LargeRest) -> bool:
+def _of_its_own(traced: SearchResult, i: int, rest: ExcessResidual) -> bool:
     """Whether E says how much candidate i explains: the rest of the model takes little of it up.
 
     What inertias nearly take up has next to no E, however large it is.
@@ -218,7 +218,7 @@ def _taken_up(traced: SearchResult, i: int) -> bool:
     return bool(judge.white.schur(others).gain(i, absorbed=SHARED).left <= _OF_ITS_OWN)
 
 
-def _limit_of_mean(traced: SearchResult, i: int, rest: LargeRest) -> float | None:
+def _limit_of_mean(traced: SearchResult, i: int, rest: ExcessResidual) -> float | None:
     """U/E from which it is the mean of something; None if it would not be that of any function."""
     effect = traced.candidates[i].effect
     if effect.is_change or "time" in effect.function_of:
@@ -232,7 +232,7 @@ def _is_constant(effect: Effect) -> bool:
     return not effect.function_of and len(effect.joints) == 1 and not effect.carried
 
 
-def _surely_left(rest: LargeRest) -> float:
+def _surely_left(rest: ExcessResidual) -> float:
     """Share of a residual's energy that is predictable, or no noise if that is more."""
     if rest.noise is None:
         return rest.predictable

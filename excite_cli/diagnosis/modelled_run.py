@@ -29,7 +29,7 @@ from excite_cli.workers.context import each
 
 
 @dataclass(frozen=True)
-class Model:
+class DeclaredModel:
     """What is known before: robot, declared effects, a prior on the inertias, states of runs.
 
     `vague`: the prior is no word of the user's, who left the inertias to the data.
@@ -94,7 +94,7 @@ def places_of(effects: Sequence[Effect], count: int) -> list[slice]:
 class ModelledRun:
     """A run's rigid-body quantities; `inertial` (M, n, r): averages of base parameters' columns."""
 
-    def __init__(self, model: Model, run: PreparedRun, inertial: Array) -> None:
+    def __init__(self, model: DeclaredModel, run: PreparedRun, inertial: Array) -> None:
         self.model = model
         self._body = RigidBody(model.robot, standard_parameters(model.robot), run.q, run.v, run.a)
         self.take(run, inertial)
@@ -133,20 +133,20 @@ def _load(shared: tuple[Robot, Array], run: PreparedRun, tell: Tell) -> Array:
     return RigidBody(robot, phi, run.q, run.v, run.a).load
 
 
-def inertial_columns(model: Model, runs: Sequence[PreparedRun]) -> list[Array]:
+def inertial_columns(model: DeclaredModel, runs: Sequence[PreparedRun]) -> list[Array]:
     """Averages (M, n, r) of the base parameters' columns of every run."""
     spool = Spool()
     return [spool.keep(columns) for columns in each(_inertial, model, runs)]
 
 
-def _inertial(model: Model, run: PreparedRun, tell: Tell) -> Array:
+def _inertial(model: DeclaredModel, run: PreparedRun, tell: Tell) -> Array:
     phi = standard_parameters(model.robot)
     columns = RigidBody(model.robot, phi, run.q, run.v, run.a).regressor
     return run.averaged_for_fit(columns[:, :, model.base.selection])
 
 
 def training_data(
-    model: Model,
+    model: DeclaredModel,
     folds: Sequence[int],
     modelled: Sequence[ModelledRun],
     signals: Sequence[Signals],
@@ -164,7 +164,7 @@ def training_data(
 
 
 def _declared(
-    model: Model, task: tuple[PreparedRun, Array, Signals], tell: Tell
+    model: DeclaredModel, task: tuple[PreparedRun, Array, Signals], tell: Tell
 ) -> tuple[Array, Array]:
     """Inertial columns and those of the declared effects, and torque."""
     run, inertial, signals = task

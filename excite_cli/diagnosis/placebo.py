@@ -14,7 +14,7 @@ from scipy.stats import chi2
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.noise_model import NoiseModel
-from excite_cli.diagnosis.training import Columns, Shown, TrainingData
+from excite_cli.diagnosis.training import Columns, PartColumns, TrainingData
 from excite_cli.robot.model import Array
 from excite_cli.workers.base import Tell
 from excite_cli.workers.context import each
@@ -76,7 +76,7 @@ def placebo_gains(
             ]
     at, factor = white.columns(chosen), white.factor(chosen)
     residuals = data.residuals(candidates, chosen, white.solve(chosen))
-    taken = [Shown(candidates[i].rows, candidates[i].columns) for i in chosen]
+    taken = [PartColumns(candidates[i].rows, candidates[i].columns) for i in chosen]
     made = each(_products, (data, taken, noise, residuals), tasks)
     gains: list[float] = []
     for _ in range(len(tasks) // len(sizes)):

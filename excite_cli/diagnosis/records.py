@@ -58,7 +58,7 @@ def mean_of_known(values: Iterable[float]) -> float:
 
 
 @dataclass(frozen=True)
-class Removed:
+class ErrorReduction:
     """By how much an effect lowers a joint's error on held-out data: relative, and RMS [N·m]."""
 
     relative: float
@@ -90,7 +90,7 @@ class NamedEffect(Shown):
     approximates: Approximation | None = None
     least_p: float = 0.0
     verdict: HeldOutVerdict | None = None
-    removes: dict[str, Removed] = field(default_factory=dict)
+    removes: dict[str, ErrorReduction] = field(default_factory=dict)
     parts: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -126,7 +126,7 @@ class FrictionLine:
     curved: bool
     kinds: tuple[str, ...] = ()
     verdict: HeldOutVerdict | None = None
-    removes: dict[str, Removed] = field(default_factory=dict)
+    removes: dict[str, ErrorReduction] = field(default_factory=dict)
     parts: dict[str, float] = field(default_factory=dict)
 
 
@@ -149,7 +149,7 @@ class JointAlias:
 
 
 @dataclass(frozen=True)
-class Absorbed:
+class ConfoundedCandidate:
     """A candidate that shows as a change of parameters of the declared model only."""
 
     kind: str
@@ -159,7 +159,7 @@ class Absorbed:
 
 
 @dataclass(frozen=True)
-class LargeRest:
+class ExcessResidual:
     """More than noise is left of the torque of `joint` once all effects are in (training data).
 
     `rms` of the filtered residual and `noise` [N·m] (N), this by its `basis`: `periods` that were
@@ -278,7 +278,7 @@ class Diagnosis(Shown):
     base_names: Annotated[tuple[str, ...], shape("r")]
     declared: tuple[EffectRecord, ...]
     effects: tuple[NamedEffect, ...]
-    absorbed: tuple[Absorbed, ...]
+    absorbed: tuple[ConfoundedCandidate, ...]
     held_out_run: str
     before: Errors
     after: Errors
@@ -298,7 +298,7 @@ class Diagnosis(Shown):
     parts: tuple[HeldOutEnds, ...] = ()
     untouched: Errors | None = None
     textbook: Textbook | None = None
-    large_rests: tuple[LargeRest, ...] = ()
+    excess_residuals: tuple[ExcessResidual, ...] = ()
     joint_aliases: tuple[JointAlias, ...] = ()
     friction_lines: tuple[FrictionLine, ...] = ()
     inertia_parts: dict[str, float] = field(default_factory=dict)
@@ -359,14 +359,14 @@ class Diagnosis(Shown):
         return tuple(each for each in self.effects if not each.approximates)
 
     @property
-    def unexplained(self) -> tuple[LargeRest, ...]:
+    def unexplained(self) -> tuple[ExcessResidual, ...]:
         """What is left and depends on something, in a form that no effect has."""
-        return tuple(each for each in self.large_rests if each.depends_on)
+        return tuple(each for each in self.excess_residuals if each.depends_on)
 
     @property
     def joints_with_residual(self) -> tuple[str, ...]:
         """Joints of whose torque structure, or surely more than noise, is left."""
-        left = {each.joint for each in self.large_rests if each.certain}
+        left = {each.joint for each in self.excess_residuals if each.certain}
         return tuple(joint for joint in self.joint_names if joint in left)
 
     @property

@@ -29,7 +29,7 @@ _Move = tuple[int, tuple[int, ...]]  # a member, and who comes in its place
 T = TypeVar("T")
 
 
-class Search:
+class CandidateSearch:
     """A search from the declared model for the set that is judged best."""
 
     def __init__(

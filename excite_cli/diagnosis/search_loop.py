@@ -21,7 +21,7 @@ from excite_cli.diagnosis.extrapolation import Reach, UsualMotion
 from excite_cli.diagnosis.in_runs import SeenRuns
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.modelled_run import (
-    Model,
+    DeclaredModel,
     ModelledRun,
     inertial_columns,
     signals_of_all,
@@ -30,7 +30,7 @@ from excite_cli.diagnosis.modelled_run import (
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
 from excite_cli.diagnosis.placebo import placebos_of
 from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
-from excite_cli.diagnosis.search import Search
+from excite_cli.diagnosis.search import CandidateSearch
 from excite_cli.diagnosis.textbook import everyday, textbook_effects
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.diagnosis.verdict import Verdict
@@ -70,7 +70,7 @@ class SearchResult:
     levels: Array
     inflation: float
     sizes: PossibleSizes
-    model: Model
+    model: DeclaredModel
     usual: UsualMotion
     plain: tuple[int, ...] = ()
 
@@ -115,7 +115,7 @@ class SearchResult:
 
 
 def trace(
-    model: Model,
+    model: DeclaredModel,
     spec: DiagnosisSpec,
     prepared: Callable[[LeftOut], list[PreparedRun]],
     folds: Sequence[int],
@@ -192,13 +192,13 @@ def trace(
 class _Pass:
     """What a pass began from, and the error of what it found on runs left out."""
 
-    fit: "Fit"
+    fit: "PassFit"
     left_out: LeftOut
     error: float
 
 
 @dataclass(frozen=True)
-class Fit:
+class PassFit:
     """The model after a pass: φ, effects found, values of declared and found ones, noise."""
 
     phi: Array
@@ -212,7 +212,7 @@ class Fit:
         """Where its effects are."""
         return {effect.place for effect in self.effects}
 
-    def close_to(self, other: "Fit") -> bool:
+    def close_to(self, other: "PassFit") -> bool:
         """Whether another fit of the same effects is about the same."""
         shapes = {(e.kind, e.joints, e.runs): e.shape for e in other.effects}
         moved = [_distance(e.shape, shapes[e.kind, e.joints, e.runs]) for e in self.effects]
@@ -226,7 +226,7 @@ def _is_new(level: float, known: float | None) -> bool:
     return known is None or abs(level - known) > _SAME_LEVEL * known
 
 
-def beside_cuts(fit: Fit) -> Fit:
+def beside_cuts(fit: PassFit) -> PassFit:
     """The fit without what cuts the torque.
 
     Columns of a cut are reckoned with the model of the pass before: where torque is cut, a fit can
@@ -252,15 +252,18 @@ def _without_kinds(spec: DiagnosisSpec, effects: Sequence[Effect]) -> DiagnosisS
 
 
 def _beside(
-    model: Model, folds: Sequence[int], bodies: Sequence[ModelledRun], effects: Sequence[Effect]
-) -> Model:
+    model: DeclaredModel,
+    folds: Sequence[int],
+    bodies: Sequence[ModelledRun],
+    effects: Sequence[Effect],
+) -> DeclaredModel:
     """The model whose prior is as wide as what is fitted beside these effects asks for."""
     assert model.prior is not None
     signals = signals_of_all(bodies, standard_parameters(model.robot), (), np.zeros(0))
     data = training_data(model, folds, bodies, signals)
     found = with_columns([(effect, 1) for effect in effects], signals, data.runs)
 
-    def fitted(prior: InertialPrior) -> tuple[Array, Model]:
+    def fitted(prior: InertialPrior) -> tuple[Array, DeclaredModel]:
         tried = replace(model, prior=prior)
         rows = tried.known
         fit = WeightedFit(replace(data, prior=rows.T @ rows), found)
@@ -270,11 +273,11 @@ def _beside(
 
 
 def _first_fit(
-    model: Model,
+    model: DeclaredModel,
     folds: Sequence[int],
     bodies: Sequence["ModelledRun"],
     effects: Sequence[Effect],
-) -> Fit:
+) -> PassFit:
     """The declared model with these effects, rows weighted by what it leaves."""
     known = (*model.declared, *effects)
     phi = standard_parameters(model.robot)
@@ -295,14 +298,14 @@ def _first_fit(
         effects = [each.effect for each in found]
         known = (*model.declared, *effects)
         values = values_of(model, data, parameters)
-    return Fit(phi, tuple(effects), values, levels, evidence.energy(chosen))
+    return PassFit(phi, tuple(effects), values, levels, evidence.energy(chosen))
 
 
-def fit_of(model: Model, traced: SearchResult) -> Fit:
+def fit_of(model: DeclaredModel, traced: SearchResult) -> PassFit:
     """What a search found, to begin the next one from."""
     plain = traced.judge.plain
     parameters = plain.solve(traced.chosen)
-    return Fit(
+    return PassFit(
         model.full_inertias(parameters),
         traced.effects,
         values_of(model, traced.data, parameters),
@@ -318,18 +321,18 @@ def _left_out(traced: SearchResult) -> float:
     return float(np.mean(np.log(squares / np.maximum(counts, 1) * traced.levels**2 + 1e-300))) / 2
 
 
-def values_of(model: Model, data: TrainingData, parameters: Array) -> Array:
+def values_of(model: DeclaredModel, data: TrainingData, parameters: Array) -> Array:
     """Of the effects, declared ones and those found."""
     return parameters[data.declared[0].shape[2] - model.declared_width :]
 
 
 def _one_pass(
-    model: Model,
+    model: DeclaredModel,
     spec: DiagnosisSpec,
     folds: Sequence[int],
     run_names: Sequence[str],
     bodies: Sequence["ModelledRun"],
-    fit: Fit,
+    fit: PassFit,
     over: Callable[[], bool],
 ) -> SearchResult:
     """Columns and noise as the last fit says, then a search from the textbook's model."""
@@ -386,7 +389,7 @@ def _one_pass(
 
 
 def _searched(
-    judge: Judgement, most: int, data: TrainingData, model: Model, over: Callable[[], bool]
+    judge: Judgement, most: int, data: TrainingData, model: DeclaredModel, over: Callable[[], bool]
 ) -> list[int]:
     """The best set found from the textbook's; if something was weighed, from nothing or all gains.
 
@@ -394,7 +397,7 @@ def _searched(
     inertias.
     """
     open_ = set(differences(judge.candidates, data, model))
-    search = Search(judge, most, over=over)
+    search = CandidateSearch(judge, most, over=over)
     if not model.is_weighed:
         chosen = search.run(search.pruned(everyday(judge.candidates)) if most else ())
         if over():  # a pass that was cut short may know less than the one before it
@@ -424,7 +427,9 @@ def _in_both(judge: Judgement, chosen: Sequence[int], open_: Collection[int]) ->
     return found
 
 
-def differences(candidates: Sequence[Candidate], data: TrainingData, model: Model) -> Iterator[int]:
+def differences(
+    candidates: Sequence[Candidate], data: TrainingData, model: DeclaredModel
+) -> Iterator[int]:
     """Changes of which two recordings do not say which of them is usual, and nobody else does.
 
     What one of the two has more of says nothing of a third.

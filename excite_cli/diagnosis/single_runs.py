@@ -11,8 +11,8 @@ there are measured.
 from collections.abc import Sequence
 
 from excite_cli.diagnosis.candidates import record_of
-from excite_cli.diagnosis.held_out_errors import Played
-from excite_cli.diagnosis.modelled_run import Model, places_of
+from excite_cli.diagnosis.held_out_errors import HeldOutRuns
+from excite_cli.diagnosis.modelled_run import DeclaredModel, places_of
 from excite_cli.diagnosis.records import Assumption, HeldOutEnds
 from excite_cli.diagnosis.search_loop import SearchResult, differences
 from excite_cli.diagnosis.verdict import Verdict
@@ -72,7 +72,9 @@ def differences_between_runs(traced: SearchResult) -> tuple[Finding, ...]:
     return (Finding("runs_differ", "warning", text),)
 
 
-def assumptions(effects: Sequence[Effect], parts: Split, model: Model) -> tuple[Assumption, ...]:
+def assumptions(
+    effects: Sequence[Effect], parts: Split, model: DeclaredModel
+) -> tuple[Assumption, ...]:
     """What was assumed of the held-out run, where the states of runs do not say it.
 
     Of held-out blocks of the very recording that carries an effect there is nothing to assume.
@@ -104,7 +106,7 @@ def on_held_out_ends(
     found = []
     for active, runs in alike.items():
         own = [effect for effect, here in zip(single, active, strict=True) if here]
-        played = Played(robot, prepare_all(runs, processing))
+        played = HeldOutRuns(robot, prepare_all(runs, processing))
         before, after = (played.errors(played.predictions(model)) for model in models)
         found.append(
             HeldOutEnds(

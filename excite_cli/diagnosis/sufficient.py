@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.diagnosis import rules
-from excite_cli.diagnosis.comparison import Comparison
+from excite_cli.diagnosis.comparison import ModelComparison
 from excite_cli.diagnosis.extrapolation import torque_seen
 from excite_cli.diagnosis.search import weakest_apart
 from excite_cli.diagnosis.search_loop import SearchResult
@@ -125,13 +125,13 @@ def _otherwise(gram: Array, across: Array, own: Array, size: Array) -> Array:
     return np.asarray(mean + _DEVIATIONS * spread)
 
 
-def comparison_of(traced: SearchResult) -> Comparison:
+def comparison_of(traced: SearchResult) -> ModelComparison:
     """Of models of what was found and of the textbook's effects."""
     members = {*traced.chosen, *everyday(traced.candidates)}
-    return Comparison(traced.data, traced.candidates, members, traced.levels)
+    return ModelComparison(traced.data, traced.candidates, members, traced.levels)
 
 
-def sufficient(traced: SearchResult, models: Comparison) -> list[int]:
+def sufficient(traced: SearchResult, models: ModelComparison) -> list[int]:
     """The candidates found, with what every robot has, or the textbook's."""
     several = _seen_on_several(traced, models)
     single = _of_single_runs(traced, models, several)
@@ -147,7 +147,7 @@ def sufficient(traced: SearchResult, models: Comparison) -> list[int]:
     return those_that_matter(traced, best)
 
 
-def _seen_on_several(traced: SearchResult, models: Comparison) -> list[int]:
+def _seen_on_several(traced: SearchResult, models: ModelComparison) -> list[int]:
     """What was found, but for what acts on several joints and is missed on one of them at most."""
     judge, found = traced.judge, list(traced.chosen)
     while True:
@@ -163,7 +163,9 @@ def _seen_on_several(traced: SearchResult, models: Comparison) -> list[int]:
         found = judge.without(min(doubtful, key=doubtful.__getitem__), found)
 
 
-def _of_single_runs(traced: SearchResult, models: Comparison, found: Sequence[int]) -> list[int]:
+def _of_single_runs(
+    traced: SearchResult, models: ModelComparison, found: Sequence[int]
+) -> list[int]:
     """What single runs carry, of what was found: seconds left out of the same recordings miss it.
 
     Or it is too brief for them to know.

@@ -10,13 +10,13 @@ from collections.abc import Sequence
 from itertools import product
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.comparison import Comparison
-from excite_cli.diagnosis.modelled_run import Model
+from excite_cli.diagnosis.comparison import ModelComparison
+from excite_cli.diagnosis.modelled_run import DeclaredModel
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION, catalogue, shows
 
 
-def textbook_effects(model: Model) -> list[Effect]:
+def textbook_effects(model: DeclaredModel) -> list[Effect]:
     """The textbook's effects on all joints, those that are declared left away."""
     known = {effect.place for effect in model.declared}
     kinds = [catalogue()[name] for name in (*EVERYDAY_FRICTION, *EVERYDAY)]
@@ -29,7 +29,7 @@ def everyday(candidates: Sequence[Candidate]) -> list[int]:
     return _of(candidates, (*EVERYDAY_FRICTION, *EVERYDAY))
 
 
-def textbook(candidates: Sequence[Candidate], models: Comparison) -> list[int]:
+def textbook(candidates: Sequence[Candidate], models: ModelComparison) -> list[int]:
     """The candidates of that set of the textbook's which predicts data left out best."""
     best: list[int] | None = None
     for more in product((False, True), repeat=len(EVERYDAY)):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence, Grams, JointGram
 from excite_cli.diagnosis.noise_model import NoiseModel
-from excite_cli.identification.covariance import Rows
+from excite_cli.identification.covariance import RunRows
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.out_of_core import Spool, forget
 from excite_cli.robot.model import Array
@@ -24,7 +24,7 @@ _FEWEST_BLOCKS = 4
 
 
 @dataclass(frozen=True)
-class Shown:
+class PartColumns:
     """Columns (M, rows, width) per part on the rows of some joints, whoever made them."""
 
     rows: tuple[int, ...]
@@ -36,7 +36,7 @@ class Shown:
         return int(self.columns[0].shape[2])
 
 
-Columns = Candidate | Shown  # what may be added to the model
+Columns = Candidate | PartColumns  # what may be added to the model
 
 
 @dataclass(frozen=True)
@@ -145,13 +145,13 @@ class TrainingData:
         ]
         return columns, self.runs[part].usable[:, joint]
 
-    def rows(self, candidates: Sequence[Columns], chosen: Sequence[int]) -> list[Rows]:
+    def rows(self, candidates: Sequence[Columns], chosen: Sequence[int]) -> list[RunRows]:
         """Rows of every run for the regression of `identify`."""
         spool, found = Spool(), []
         for part, run in enumerate(self.runs):
             joints = [self.columns(candidates, chosen, part, joint) for joint in range(self.n)]
             columns = spool.keep(np.stack(joints, axis=1))
-            found.append(Rows(columns, self.tau[part], run.usable, rounding=run.rounding))
+            found.append(RunRows(columns, self.tau[part], run.usable, rounding=run.rounding))
             forget()
         return found
 

@@ -9,8 +9,8 @@ from excite_cli.diagnosis.records import (
     Assumption,
     Diagnosis,
     EffectRecord,
+    ExcessResidual,
     HeldOutEnds,
-    LargeRest,
     NamedEffect,
 )
 from excite_cli.diagnosis.verdict import HeldOutVerdict
@@ -206,7 +206,7 @@ def rests_in_words(
     units = dict(zip(found.joint_names, known, strict=True))
     more: list[str] = []
     perhaps: dict[tuple[str, str], list[str]] = {each: [] for each in _PERHAPS}
-    for rest in found.large_rests:
+    for rest in found.excess_residuals:
         left = (
             f"{rest.joint} {rest.rms:.3g} {units[rest.joint]} RMS ({rest.share_of_torque:.1%} of "
             "its torque in the training data)"
@@ -221,7 +221,7 @@ def rests_in_words(
     return more, said
 
 
-def _predicted(rest: LargeRest, say: Callable[[Covariate], str]) -> str:
+def _predicted(rest: ExcessResidual, say: Callable[[Covariate], str]) -> str:
     share = f"{rest.predictable:.0%} of its variance is predictable"
     if rest.depends_on:
         best = " and ".join(map(say, rest.depends_on))

@@ -35,7 +35,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.dynamics.block_kinematics import (
-    BodyMotion,
+    BlockMotion,
     Joint,
     body_jacobians,
     body_motions,
@@ -106,7 +106,7 @@ def block_pull_back(
 
 
 def _partials(
-    robot: Robot, joints: list[Joint], motions: list[BodyMotion], transforms: list[Array], Z: Array
+    robot: Robot, joints: list[Joint], motions: list[BlockMotion], transforms: list[Array], Z: Array
 ) -> tuple[Array, Array]:
     """Sums over i: B_ijᵀ Z_ij of each body (B, T, 6, 10), and ∂/∂A_k of Eq. 36 (B, T, 6, 6)."""
     inverses = [_inverse_transform(body.position, body.rotation) for body in motions]
@@ -207,7 +207,7 @@ def _hat_dot(x: Array) -> Array:
 _OPERATORS = _hat_dot(-np.eye(6)).reshape(36, 6)
 
 
-def _local(body: BodyMotion) -> tuple[Array, Array, Array]:
+def _local(body: BlockMotion) -> tuple[Array, Array, Array]:
     """ʲξ_j of Eq. 29 as ʲp̈_j, ʲω̇_j, ʲω_j, each (T, 3)."""
     back = _transpose(body.rotation)
     linear, angular, velocity = (

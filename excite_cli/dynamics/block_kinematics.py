@@ -46,7 +46,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class BodyMotion:
+class BlockMotion:
     """One body over T samples, in world axes.
 
     `position` [m], `velocity` ω [rad/s], `angular` ω̇ [rad/s²] and `linear` p̈ (gravity included)
@@ -114,7 +114,7 @@ def joints_of(robot: Robot) -> list[Joint]:
 
 def body_motions(
     robot: Robot, joints: list[Joint], q: Array, v: Array, a: Array
-) -> list[BodyMotion]:
+) -> list[BlockMotion]:
     """Motion of the world (index 0) and of every body, in the order of `joints`.
 
     Parameters
@@ -124,7 +124,7 @@ def body_motions(
     zero, none = np.zeros((len(q), 3)), np.zeros((len(q), 1))
     gravity = zero - np.asarray(robot.model.gravity.linear)
     upright = np.tile(np.eye(3), (len(q), 1, 1))
-    motions = [BodyMotion(zero, upright, zero, zero, gravity, zero, zero, none, none)]
+    motions = [BlockMotion(zero, upright, zero, zero, gravity, zero, zero, none, none)]
     for joint in joints[1:]:
         column = joint.column
         rates = (none, none, none)
@@ -134,7 +134,7 @@ def body_motions(
     return motions
 
 
-def _carried(parent: BodyMotion, joint: Joint, q: Array, v: Array, a: Array) -> BodyMotion:
+def _carried(parent: BlockMotion, joint: Joint, q: Array, v: Array, a: Array) -> BlockMotion:
     """Motion of the body that `joint` carries, from its parent's."""
     offset = parent.rotation @ joint.translation
     rotation = parent.rotation @ joint.rotation
@@ -151,7 +151,7 @@ def _carried(parent: BodyMotion, joint: Joint, q: Array, v: Array, a: Array) -> 
         offset = offset + axis * q
         sliding = axis * a + 2 * np.cross(parent.velocity, axis * v)
     centripetal = np.cross(parent.velocity, np.cross(parent.velocity, offset))
-    return BodyMotion(
+    return BlockMotion(
         position=parent.position + offset,
         rotation=rotation,
         velocity=velocity,
@@ -164,7 +164,7 @@ def _carried(parent: BodyMotion, joint: Joint, q: Array, v: Array, a: Array) -> 
     )
 
 
-def body_jacobians(joints: list[Joint], motions: list[BodyMotion], n: int) -> list[BodyJacobians]:
+def body_jacobians(joints: list[Joint], motions: list[BlockMotion], n: int) -> list[BodyJacobians]:
     """Derivatives of every body's motion, in the order of `joints`; `n` moved joints."""
     count = len(motions[0].position)
     zero = np.zeros((count, 3, 3 * n))
@@ -176,7 +176,7 @@ def body_jacobians(joints: list[Joint], motions: list[BodyMotion], n: int) -> li
 
 
 def _carried_jacobians(
-    parent: BodyMotion, given: BodyJacobians, joint: Joint, motion: BodyMotion
+    parent: BlockMotion, given: BodyJacobians, joint: Joint, motion: BlockMotion
 ) -> BodyJacobians:
     """Product rule on `_carried`, with `given` the parent's derivatives."""
     if joint.column is None:

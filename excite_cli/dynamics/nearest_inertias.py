@@ -21,7 +21,7 @@ _ROOT2 = float(np.sqrt(2.0))
 
 
 @dataclass(frozen=True)
-class Nearest:
+class NearestInertias:
     """`x` (size,), ‖w‖² as `distance`, `status` of the solver, a sentence where it failed."""
 
     x: Array
@@ -32,7 +32,7 @@ class Nearest:
 
 def nearest_inertias(
     back: Array, start: Array, lengths: Array, signs: NDArray[np.intp], margin: float
-) -> Nearest:
+) -> NearestInertias:
     """Solve the program.
 
     Parameters
@@ -45,7 +45,7 @@ def nearest_inertias(
     """
     bodies = len(lengths)
     if not _broken(start, lengths, signs, margin):
-        return Nearest(start, 0.0, "no constraint is active", True)
+        return NearestInertias(start, 0.0, "no constraint is active", True)
     back = _bounded(back, start, lengths)
     rows = [-_unit(back[signs])[0]]
     bounds = [start[signs] * _unit(back[signs])[1]]
@@ -61,7 +61,7 @@ def nearest_inertias(
     eigenvalues = smallest_eigenvalues(x[: 10 * bodies], lengths)
     if solved and eigenvalues.min() <= 0:
         status, solved = f"{status}, but a body is left with a negative eigenvalue", False
-    return Nearest(x, float(w @ w), status, solved)
+    return NearestInertias(x, float(w @ w), status, solved)
 
 
 def _bounded(back: Array, start: Array, lengths: Array) -> Array:

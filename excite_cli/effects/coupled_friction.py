@@ -21,7 +21,7 @@ from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Sco
 from excite_cli.effects.c_code import real
 from excite_cli.effects.mjcf_parts import MjcfParts, Tendon
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
-from excite_cli.effects.simulated_robot import Coupling, SimulatedRobot
+from excite_cli.effects.simulated_robot import DryCoupling, SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 
 _USUAL_SPEED = 0.25  # rad/s, at which a shaft's two parts are weighed: joints are slow at reversals
@@ -77,7 +77,7 @@ class CoupledFriction(Effect):
         first, second = self.joints
         if numbers["coulomb"] > 0.0:
             direction = 1.0 if numbers["direction"] > 0 else -1.0
-            robot.couplings.append(Coupling(first, second, direction, numbers["coulomb"]))
+            robot.couplings.append(DryCoupling(first, second, direction, numbers["coulomb"]))
         viscous = values * np.array([1.0, 0.0])
         if viscous.any():
             robot.apply(self, viscous)

@@ -34,7 +34,7 @@ class Transmission:
 
 
 @dataclass(frozen=True)
-class Coupling:
+class DryCoupling:
     """Dry friction `force` on v_first + direction · v_second."""
 
     first: int
@@ -81,7 +81,7 @@ class SimulatedRobot(Protocol):
     gain: Array
     offset: Array
     soft: dict[int, Transmission]
-    couplings: list[Coupling]
+    couplings: list[DryCoupling]
     pushes: list[Push]
 
     def link_inertia(self, joint: int) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 from excite_cli.constraints.base import Array
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.excitation.problem import Problem
-from excite_cli.proof.certificate import Path, Verdict, Worst, certify
+from excite_cli.proof.certificate import Path, ProofVerdict, Worst, certify
 from excite_cli.trajectory.base import Trajectory
 
 CONTROLLER_RATE = 1000.0
@@ -57,7 +57,7 @@ def worst_margins(
     return found
 
 
-def verdicts(problem: Problem, coefficients: Array) -> tuple[Verdict, ...]:
+def verdicts(problem: Problem, coefficients: Array) -> tuple[ProofVerdict, ...]:
     """What is known of every constraint of the problem between the instants of any grid."""
     return certify(path_of(problem, problem.trajectory, coefficients), problem.constraints)
 

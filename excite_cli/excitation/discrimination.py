@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve
 
 from excite_cli.excitation.objective import Objective, Spectrum
-from excite_cli.excitation.progress import Figure, Measure
+from excite_cli.excitation.progress import Figure, ProgressMeasure
 from excite_cli.excitation.stack import Stack
 from excite_cli.robot.model import Array
 
@@ -67,7 +67,7 @@ class SeparationSpectrum(Spectrum):
     @property
     def figure(self) -> Figure:
         """The smallest divergence."""
-        return Figure(Measure.DIVERGENCE, 0.5 * float(self.sigma[-1]) ** 2)
+        return Figure(ProgressMeasure.DIVERGENCE, 0.5 * float(self.sigma[-1]) ** 2)
 
 
 def residual_directions(gram: Array, directions: Sequence[Direction]) -> tuple[Array, Array]:

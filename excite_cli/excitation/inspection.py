@@ -19,7 +19,7 @@ from excite_cli.excitation.mesh_verdict import MeshVerdict, mesh_verdict
 from excite_cli.excitation.motion import Doubt
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.mesh_check import MeshCheck
-from excite_cli.proof.certificate import Path, Verdict, Worst, certify
+from excite_cli.proof.certificate import Path, ProofVerdict, Worst, certify
 from excite_cli.shown.record import Shown
 
 # Margins of a motion by a second computation, which shares nothing with the first.
@@ -120,7 +120,7 @@ class Inspection(Shown):
     """
 
     worst: dict[str, Worst]
-    verdicts: tuple[Verdict, ...]
+    verdicts: tuple[ProofVerdict, ...]
     second: tuple[SecondPath, ...]
     meshes: MeshVerdict | None
 
@@ -203,8 +203,8 @@ def inspect(problem: Problem, path: Path, meshes: MeshCheck | None, look: Look) 
 
 
 def _within_limits(
-    verdicts: tuple[Verdict, ...], constraints: Sequence[Constraint]
-) -> tuple[Verdict, ...]:
+    verdicts: tuple[ProofVerdict, ...], constraints: Sequence[Constraint]
+) -> tuple[ProofVerdict, ...]:
     """Distances are not proved where positions leave the limits that pairs were chosen within."""
     both = list(zip(verdicts, constraints, strict=True))
     if all(verdict.proved for verdict, constraint in both if _of_positions(constraint)):
@@ -268,7 +268,7 @@ _SAME = 1e-6
 
 
 @dataclass(frozen=True)
-class Difference:
+class SampleDifference:
     """By how much samples that a file holds differ from its coefficients, and when [s].
 
     `share`: of the largest value.
@@ -294,7 +294,7 @@ class Inspections(Shown, Mapping[str, Inspection]):
 
     motions: dict[str, Inspection]
     look: Look
-    differences: dict[str, Difference] = field(default_factory=dict)
+    differences: dict[str, SampleDifference] = field(default_factory=dict)
     slow: float | None = None
     doubts: dict[str, Doubt] = field(default_factory=dict)
 
@@ -307,9 +307,9 @@ class Inspections(Shown, Mapping[str, Inspection]):
     def __len__(self) -> int:
         return len(self.motions)
 
-    def difference(self, name: str) -> Difference:
+    def difference(self, name: str) -> SampleDifference:
         """That of one motion; none where no samples are known."""
-        return self.differences.get(name, Difference())
+        return self.differences.get(name, SampleDifference())
 
     def doubt(self, name: str) -> Doubt:
         """That of one motion; none where it is not of a result."""

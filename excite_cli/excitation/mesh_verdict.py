@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from excite_cli.constraints.base import Array
 from excite_cli.geometry.mesh_check import MeshCheck, MeshGap, MeshGaps
-from excite_cli.geometry.reasons import Standing
+from excite_cli.geometry.reasons import ContactMeaning
 from excite_cli.proof.certificate import Path, State, Worst
 from excite_cli.proof.enclosed_trajectory import Intervals, enclosed_states, intervals_of
 
@@ -40,7 +40,7 @@ class MeshVerdict:
 
     def worst(self) -> Worst:
         """The nearest judged pair; a bound for all where none came near."""
-        judged = [gap for gap in self.gaps.near if gap.standing is Standing.JUDGED]
+        judged = [gap for gap in self.gaps.near if gap.standing is ContactMeaning.JUDGED]
         if not judged:
             return Worst(self.gaps.beyond, "m", "all pairs farther", float(self.times[0]), 0)
         nearest = judged[0]
@@ -53,7 +53,9 @@ class MeshVerdict:
     def told(self) -> tuple[MeshGap, ...]:
         """Pairs that touch and are not judged, with the reason in `standing`."""
         return tuple(
-            gap for gap in self.gaps.near if gap.standing is not Standing.JUDGED and gap.touching
+            gap
+            for gap in self.gaps.near
+            if gap.standing is not ContactMeaning.JUDGED and gap.touching
         )
 
 

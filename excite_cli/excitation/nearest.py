@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from excite_cli.constraints.drawing import Nearest
+from excite_cli.constraints.drawing import NearestBodies
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.link_meshes import Poses
@@ -25,7 +25,9 @@ def closest_time(problem: Problem, segment: Segment, rate: float = 100.0) -> flo
     return float(times[int(np.argmin(np.min(found, axis=0)))]) if found else 0.0
 
 
-def nearest_bodies(problem: Problem, poses: Poses, margins: Sequence[Array]) -> Nearest | None:
+def nearest_bodies(
+    problem: Problem, poses: Poses, margins: Sequence[Array]
+) -> NearestBodies | None:
     """Among all pairs of bodies that the problem keeps apart; `margins` of each constraint."""
     parts = zip(problem.constraints, margins, strict=True)
     found = [near for c, margin in parts if (near := c.nearest(poses, margin)) is not None]
@@ -33,7 +35,7 @@ def nearest_bodies(problem: Problem, poses: Poses, margins: Sequence[Array]) -> 
         return None
     chosen = np.argmin([near.distances for near in found], axis=0).tolist()
     at = [(found[index], t) for t, index in enumerate(chosen)]
-    return Nearest(
+    return NearestBodies(
         np.array([near.distances[t] for near, t in at]),
         np.array([near.ends[t] for near, t in at]),
         tuple(near.capsules[t] for near, t in at),

@@ -19,7 +19,7 @@ from excite_cli.dynamics.regressor import Regressor
 from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint
 from excite_cli.excitation.effect_columns import SeenColumns
 from excite_cli.excitation.extension import Extension
-from excite_cli.excitation.progress import Figure, Measure
+from excite_cli.excitation.progress import Figure, ProgressMeasure
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import Weighting
 from excite_cli.kernels.compiled import KERNELS
@@ -53,8 +53,10 @@ class Spectrum:
     def figure(self) -> Figure:
         """What a solver improves."""
         if self.of_torques:
-            return Figure(Measure.TORQUE_DEVIATION, float(np.sqrt(np.sum(self.sigma**-2.0))))
-        return Figure(Measure.CONDITION_NUMBER, self.condition_number)
+            return Figure(
+                ProgressMeasure.TORQUE_DEVIATION, float(np.sqrt(np.sum(self.sigma**-2.0)))
+            )
+        return Figure(ProgressMeasure.CONDITION_NUMBER, self.condition_number)
 
 
 class Objective:

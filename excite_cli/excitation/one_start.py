@@ -27,7 +27,7 @@ _GUARD_FASTER = 4.0
 
 
 @dataclass(frozen=True)
-class Search:
+class StartContext:
     """What all starts share."""
 
     problem: Problem
@@ -74,7 +74,7 @@ class StoppedError(KeyboardInterrupt):
 
 
 def solve_start(
-    search: Search, task: OneStart, report: ProgressCallback
+    search: StartContext, task: OneStart, report: ProgressCallback
 ) -> FoundMotion | NoAdmissibleMotionError:
     """What the start leads to; an error is returned, since one failure does not end the others."""
     problem, solver = search.problem, search.solver
@@ -95,7 +95,7 @@ def solve_start(
     return _found(run, task, outcome, began, None if ended else task.until)
 
 
-def interrupted(search: Search, task: OneStart, found: FoundMotion) -> FoundMotion:
+def interrupted(search: StartContext, task: OneStart, found: FoundMotion) -> FoundMotion:
     """What a start has led to when the search is interrupted, corrected as at its end.
 
     Raises

@@ -128,7 +128,7 @@ class _Tree:
 
 
 @dataclass(frozen=True)
-class Search:
+class FoundPath:
     """The way (m, n) from start to end, or None and how far the search came, in words."""
 
     way: Array | None
@@ -136,7 +136,7 @@ class Search:
     reached: str = ""
 
 
-def find_way(problem: Problem, start: Array, end: Array, seed: int) -> Search:
+def find_way(problem: Problem, start: Array, end: Array, seed: int) -> FoundPath:
     """A way of straight pieces between two admissible postures (n,); a straight one if it is free.
 
     Searched with ample room first, then with little, for ten seconds at most (or
@@ -153,8 +153,8 @@ def find_way(problem: Problem, start: Array, end: Array, seed: int) -> Search:
         way, reached = _connected(space, start, end, rng, deadline)
         if way is not None:
             way = _shortened(space, way, rng, deadline)
-            return Search(way, time.perf_counter() - began)
-    return Search(None, time.perf_counter() - began, reached)
+            return FoundPath(way, time.perf_counter() - began)
+    return FoundPath(None, time.perf_counter() - began, reached)
 
 
 def _connected(

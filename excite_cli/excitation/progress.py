@@ -24,7 +24,7 @@ class Status(StrEnum):
         return self in (Status.ITERATION_LIMIT, Status.TIME_LIMIT)
 
 
-class Measure(StrEnum):
+class ProgressMeasure(StrEnum):
     """What is improved."""
 
     CONDITION_NUMBER = "condition_number"
@@ -36,7 +36,7 @@ class Measure(StrEnum):
 class Figure:
     """What is improved, and where it is."""
 
-    measure: Measure
+    measure: ProgressMeasure
     value: float
 
 
@@ -88,8 +88,8 @@ ProgressCallback = Callable[[Progress], None]
 
 def figure_in_words(figure: Figure) -> str:
     """What is improved, briefly: `cond 5.48`."""
-    if figure.measure is Measure.CONDITION_NUMBER:
+    if figure.measure is ProgressMeasure.CONDITION_NUMBER:
         return f"cond {figure.value:.2f}"
-    if figure.measure is Measure.TORQUE_DEVIATION:
+    if figure.measure is ProgressMeasure.TORQUE_DEVIATION:
         return f"torque to {figure.value:.3g} of a sample's noise"
     return f"divergence {figure.value:.3g}"

@@ -28,7 +28,7 @@ REACH = 1.0
 
 
 @dataclass(frozen=True)
-class Rows:
+class ResidualDerivatives:
     """Derivatives of K near residuals of one constraint, at `times` and `columns`."""
 
     times: Indices
@@ -120,17 +120,19 @@ class Residuals:
             values.append((margins - guard) / constraint.scale)
         return values
 
-    def rows(self, states: States, index: int, near: Mask) -> Rows:
+    def rows(self, states: States, index: int, near: Mask) -> ResidualDerivatives:
         """Derivatives of the residuals of one constraint where `near` (T, m) is true."""
         constraint = self.constraints[index]
         times, columns = np.nonzero(near)
         parts = constraint.gradients(states, times, columns)
         scale = constraint.scale[columns][:, None]
         scaled = [None if part is None else part / scale for part in parts]
-        return Rows(times, columns, (scaled[0], scaled[1], scaled[2]))
+        return ResidualDerivatives(times, columns, (scaled[0], scaled[1], scaled[2]))
 
 
-def summed_per_instant(rows: Rows, weights: Array, samples: int) -> list[Array | None]:
+def summed_per_instant(
+    rows: ResidualDerivatives, weights: Array, samples: int
+) -> list[Array | None]:
     """Σ over the rows of each instant of weight·derivative, (T, n) per order."""
     found: list[Array | None] = []
     for part in rows.parts:
@@ -145,7 +147,9 @@ def summed_per_instant(rows: Rows, weights: Array, samples: int) -> list[Array |
     return found
 
 
-def squared_per_instant(rows: Rows, weights: Array, samples: int) -> dict[tuple[int, int], Array]:
+def squared_per_instant(
+    rows: ResidualDerivatives, weights: Array, samples: int
+) -> dict[tuple[int, int], Array]:
     """Σ over the rows of each instant of weight·(gᵢ gⱼᵀ), (T, n, n) per pair of orders."""
     if KERNELS is None:
         return _squared_at_once(rows, weights, samples)
@@ -161,7 +165,9 @@ def squared_per_instant(rows: Rows, weights: Array, samples: int) -> dict[tuple[
     return found
 
 
-def _squared_at_once(rows: Rows, weights: Array, samples: int) -> dict[tuple[int, int], Array]:
+def _squared_at_once(
+    rows: ResidualDerivatives, weights: Array, samples: int
+) -> dict[tuple[int, int], Array]:
     """`squared_per_instant` in NumPy.
 
     Rows are laid out by instant, short instants filled with zeros, for one batched product.

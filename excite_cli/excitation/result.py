@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from excite_cli.excitation.motion import Doubt, Motion, digest_of
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import RandomMotion
-from excite_cli.excitation.sequence import Step
+from excite_cli.excitation.sequence import FinishedMotion
 from excite_cli.excitation.stack import Stack
 from excite_cli.robot.model import Array
 from excite_cli.shown.record import Shown
@@ -47,7 +47,7 @@ class Result(Shown):
         """Names of the columns beside those of base parameters."""
         return self.base_words[len(self.base_selection) :]
 
-    def with_step(self, step: Step) -> "Result":
+    def with_step(self, step: FinishedMotion) -> "Result":
         """The result with one more motion, and the digest of what is said of it here."""
         motion = replace(step.motion, digest=self.digest_of(step.motion))
         return replace(self, motions=(*self.motions, motion), stack=step.stack)

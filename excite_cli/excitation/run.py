@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from excite_cli.config.load import parse_spec, spec_as_yaml
+from excite_cli.config.load_spec import parse_spec, spec_as_yaml
 from excite_cli.config.spec import OptimizerSpec, SequenceSpec, Spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.dense_grid import dense_condition_number
@@ -13,7 +13,7 @@ from excite_cli.excitation.motion import Doubt
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import ProgressCallback, Status
 from excite_cli.excitation.result import Result, matches
-from excite_cli.excitation.sequence import Step, generate_sequence
+from excite_cli.excitation.sequence import FinishedMotion, generate_sequence
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack
 from excite_cli.geometry.reasons import dropped_in_words
@@ -122,7 +122,7 @@ def continue_run(
     problem: Problem,
     result: Result,
     report: Callable[[int], ProgressCallback],
-    on_motion: Callable[[Step, Result], None],
+    on_motion: Callable[[FinishedMotion, Result], None],
     model: Problem | None = None,
     starts: Sequence[Segment] = (),
     workers: Workers | None = None,
@@ -167,7 +167,7 @@ def _running(problem: Problem, result: Result) -> Stack:
     return stack
 
 
-def _judged(step: Step, model: Problem, stack: Stack) -> Step:
+def _judged(step: FinishedMotion, model: Problem, stack: Stack) -> FinishedMotion:
     """The step as `model` sees it: its stack and its condition numbers."""
     objective, alpha = model.objective(stack), step.motion.coefficients
     motion = replace(
@@ -176,7 +176,7 @@ def _judged(step: Step, model: Problem, stack: Stack) -> Step:
         stacked_condition_number=objective.stacked_condition_number(alpha),
         dense_condition_number=dense_condition_number(model, stack, alpha),
     )
-    return Step(motion, stack.with_rows(objective.block(alpha)))
+    return FinishedMotion(motion, stack.with_rows(objective.block(alpha)))
 
 
 def _asked(spec: Spec) -> Spec:

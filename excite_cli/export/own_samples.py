@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.result import Result
 from excite_cli.robot.model import Array

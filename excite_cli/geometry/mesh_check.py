@@ -20,7 +20,7 @@ from excite_cli.geometry.mesh_pairs import (
     PairMeshes,
     movable_pairs,
 )
-from excite_cli.geometry.reasons import Standing
+from excite_cli.geometry.reasons import ContactMeaning
 from excite_cli.geometry.relative_reach import RelativeReach
 from excite_cli.robot.model import Robot
 
@@ -53,12 +53,12 @@ class MeshGap:
     distance: float
     index: int
     touching: int
-    standing: Standing = Standing.JUDGED
+    standing: ContactMeaning = ContactMeaning.JUDGED
 
     @property
     def broken(self) -> bool:
         """Whether meshes touch that must not."""
-        return self.touching > 0 and self.standing is Standing.JUDGED
+        return self.touching > 0 and self.standing is ContactMeaning.JUDGED
 
 
 @dataclass(frozen=True)
@@ -121,8 +121,12 @@ class MeshCheck:
         self._reach = RelativeReach(robot)
         self._coal: dict[tuple[int, int], PairMeshes] = {}
         pairs = self._with_standing(movable_pairs(robot, self.meshes, ignore), by_hand, seed)
-        self.always = tuple(pair for pair in pairs if pair.standing is Standing.ALWAYS_TOUCHING)
-        self.pairs = tuple(pair for pair in pairs if pair.standing is not Standing.ALWAYS_TOUCHING)
+        self.always = tuple(
+            pair for pair in pairs if pair.standing is ContactMeaning.ALWAYS_TOUCHING
+        )
+        self.pairs = tuple(
+            pair for pair in pairs if pair.standing is not ContactMeaning.ALWAYS_TOUCHING
+        )
         self.judged = tuple(pair for pair in self.pairs if pair.judged)
 
     def names(self, pair: MeshPair) -> tuple[str, str]:
@@ -141,7 +145,7 @@ class MeshCheck:
             for p in np.flatnonzero(balls.min(axis=1) <= near):
                 pair = self.pairs[p]
                 open_ = balls[p] <= running[p].limit
-                open_ = open_ & seldom if pair.standing is Standing.AT_POSTURE else open_
+                open_ = open_ & seldom if pair.standing is ContactMeaning.AT_POSTURE else open_
                 for stretch in stretches:
                     open_ = stretch.left(self._both(pair), open_, running[p].limit)
                 self._follow(running[p], pair, some, poses, open_, begin)
@@ -295,13 +299,13 @@ class MeshCheck:
         found = []
         for pair, bounds in zip(pairs, balls, strict=True):
             touching = self._touching(pair, poses, bounds)
-            standing = Standing.JUDGED
+            standing = ContactMeaning.JUDGED
             if touching.mean() >= _ALWAYS:
-                standing = Standing.ALWAYS_TOUCHING
+                standing = ContactMeaning.ALWAYS_TOUCHING
             elif {self.links[pair[0]], self.links[pair[1]]} & set(by_hand):
-                standing = Standing.BY_HAND
+                standing = ContactMeaning.BY_HAND
             elif touching[0]:
-                standing = Standing.AT_POSTURE
+                standing = ContactMeaning.AT_POSTURE
             found.append(MeshPair(*pair, standing))
         return found
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.geometry.link_meshes import LinkMesh, Part, Poses
-from excite_cli.geometry.reasons import Standing
+from excite_cli.geometry.reasons import ContactMeaning
 from excite_cli.robot.carried_bodies import MovedBodies
 from excite_cli.robot.model import Robot
 
@@ -29,12 +29,12 @@ class MeshPair:
 
     first: int
     second: int
-    standing: Standing = Standing.JUDGED
+    standing: ContactMeaning = ContactMeaning.JUDGED
 
     @property
     def judged(self) -> bool:
         """Whether contact of this pair breaks a motion."""
-        return self.standing is Standing.JUDGED
+        return self.standing is ContactMeaning.JUDGED
 
 
 class PairMeshes:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from excite_cli.config.constraints_spec import BoxSpec, SurroundingsSpec, WallSpec
 from excite_cli.geometry.segment_box import (
-    Contact,
+    BoxContact,
     point_distances,
     segment_contacts,
     segment_distances,
@@ -35,7 +35,7 @@ class Obstacle(ABC):
         """Signed distances (...) [m] of points (3, ...)."""
 
     @abstractmethod
-    def contacts(self, start: Array, along: Array) -> Contact:
+    def contacts(self, start: Array, along: Array) -> BoxContact:
         """Distances, normals in the world and shares of segments (3, K)."""
 
     @abstractmethod
@@ -64,12 +64,12 @@ class Plane(Obstacle):
         """normal·x − offset."""
         return np.asarray(np.tensordot(self.normal, points, 1) - self.offset)
 
-    def contacts(self, start: Array, along: Array) -> Contact:
+    def contacts(self, start: Array, along: Array) -> BoxContact:
         """At the lower end; in the middle where the axis is level."""
         rise = self.normal @ along
         share = np.where(rise < 0, 1.0, np.where(rise > 0, 0.0, 0.5))
         distance = self.normal @ start - self.offset + np.minimum(rise, 0.0)
-        return Contact(distance, np.repeat(self.normal[:, None], start.shape[1], 1), share)
+        return BoxContact(distance, np.repeat(self.normal[:, None], start.shape[1], 1), share)
 
     def as_coal(self, scale: float) -> tuple[coal.CollisionGeometry, Array, Array]:
         """A half-space of the world."""
@@ -104,10 +104,10 @@ class Box(Obstacle):
         place = self.position.reshape(3, *(1,) * (points.ndim - 1))
         return point_distances(np.tensordot(self.rotation.T, points - place, 1), self.half)
 
-    def contacts(self, start: Array, along: Array) -> Contact:
+    def contacts(self, start: Array, along: Array) -> BoxContact:
         """See `segment_box`."""
         distance, normal, share = segment_contacts(*self._inside(start, along), self.half)
-        return Contact(distance, self.rotation @ normal, share)
+        return BoxContact(distance, self.rotation @ normal, share)
 
     def as_coal(self, scale: float) -> tuple[coal.CollisionGeometry, Array, Array]:
         """A box in its own place."""

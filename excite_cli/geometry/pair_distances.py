@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.geometry.world_segments import (
     CapsuleAxes,
-    Nearest,
+    NearestPoints,
     WorldSegments,
     nearest_points,
     normals,
@@ -146,7 +146,7 @@ class PairDistances:
 
     def _nearest_at(
         self, world: WorldSegments, rows: Indices, cols: Indices
-    ) -> tuple[Nearest, Array, Array, Array]:
+    ) -> tuple[NearestPoints, Array, Array, Array]:
         first, second = self._first[cols], self._second[cols]
         start, along = world.start[:, first, rows], world.along[:, first, rows]
         along_second = world.along[:, second, rows]

@@ -19,7 +19,7 @@ class Why(StrEnum):
     OUT_OF_REACH = "out_of_reach"
 
 
-class Standing(StrEnum):
+class ContactMeaning(StrEnum):
     """What contact of two meshes means: a broken motion, or why it does not."""
 
     JUDGED = "judged"
@@ -83,10 +83,10 @@ _WHY = {
     Why.OUT_OF_REACH: "out of reach",
 }
 _STANDING = {
-    Standing.JUDGED: "",
-    Standing.ALWAYS_TOUCHING: "always in contact",
-    Standing.AT_POSTURE: "in contact at the posture",
-    Standing.BY_HAND: "capsule given by hand",
+    ContactMeaning.JUDGED: "",
+    ContactMeaning.ALWAYS_TOUCHING: "always in contact",
+    ContactMeaning.AT_POSTURE: "in contact at the posture",
+    ContactMeaning.BY_HAND: "capsule given by hand",
 }
 
 
@@ -95,7 +95,7 @@ def why_in_words(why: Why) -> str:
     return _WHY[why]
 
 
-def standing_in_words(standing: Standing) -> str:
+def standing_in_words(standing: ContactMeaning) -> str:
     """Why contact of two meshes breaks nothing; empty where it does."""
     return _STANDING[standing]
 

@@ -22,7 +22,7 @@ _FLAT = 1e-12  # [m²] slopes of f/2 below this are zero: the segment is level w
 _PARALLEL = 1e-9  # sine of the angle below which a segment has the direction of an edge
 
 
-class Contact(NamedTuple):
+class BoxContact(NamedTuple):
     """Signed distance (K,) [m], unit normal (3, K) away from the obstacle, share (K,) of the axis.
 
     The distance changes as the point at the share of the axis moves along the normal.
@@ -48,7 +48,7 @@ def segment_distances(start: Array, along: Array, half: Array) -> Array:
     return distance.reshape(shape)
 
 
-def segment_contacts(start: Array, along: Array, half: Array) -> Contact:
+def segment_contacts(start: Array, along: Array, half: Array) -> BoxContact:
     """As `segment_distances`, with normals and shares; start, along: (3, K)."""
     share = _nearest_share(start, along, half)
     gap = _gap(start, along, half, share)
@@ -58,7 +58,7 @@ def segment_contacts(start: Array, along: Array, half: Array) -> Contact:
     if len(inside):
         out = _way_out(start[:, inside], along[:, inside], half)
         distance[inside], normal[:, inside], share[inside] = out
-    return Contact(distance, normal, share)
+    return BoxContact(distance, normal, share)
 
 
 def point_distances(points: Array, half: Array) -> Array:
@@ -118,7 +118,7 @@ def _gap(p: Array, u: Array, half: Array, share: Array) -> Array:
     return x - np.clip(x, -half[:, None], half[:, None])
 
 
-def _way_out(p: Array, u: Array, half: Array) -> Contact:
+def _way_out(p: Array, u: Array, half: Array) -> BoxContact:
     """The shortest way out of the box for segments (3, K) that enter it."""
     count = p.shape[1]
     low, high = np.minimum(p, p + u), np.maximum(p, p + u)
@@ -144,7 +144,7 @@ def _way_out(p: Array, u: Array, half: Array) -> Contact:
     normal /= np.where(face, 1.0, sine[axis, every])
     end = (turn * u[axis, every] < 0).astype(float)
     share = np.where(face, end, _facing(p, u, half, axis, normal))
-    return Contact(apart[best, every], normal, share)
+    return BoxContact(apart[best, every], normal, share)
 
 
 def _facing(p: Array, u: Array, half: Array, axis: Array, normal: Array) -> Array:

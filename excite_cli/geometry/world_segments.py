@@ -24,7 +24,7 @@ _POINT = 1e-18  # squared length [m^2] below which a segment is a point
 _PARALLEL = 1e-12  # squared sine of the angle below which segments are parallel
 
 
-class Nearest(NamedTuple):
+class NearestPoints(NamedTuple):
     """Shares s, t (...) along the segments, and the gap (3, ...) from the first to the second."""
 
     share_first: Array
@@ -32,7 +32,9 @@ class Nearest(NamedTuple):
     gap: Array
 
 
-def nearest_points(first: Array, along_first: Array, second: Array, along_second: Array) -> Nearest:
+def nearest_points(
+    first: Array, along_first: Array, second: Array, along_second: Array
+) -> NearestPoints:
     """Nearest points of segments first + s along_first and second + t along_second.
 
     All arguments are (3, ...): a point and the vector to the other end [m].
@@ -51,7 +53,7 @@ def nearest_points(first: Array, along_first: Array, second: Array, along_second
     np.clip(s, 0.0, 1.0, out=s)
     t = np.clip((s * ab + bw) / safe_bb, 0.0, 1.0)
     s = np.clip((t * ab - aw) / safe_aa, 0.0, 1.0)
-    return Nearest(s, t, t * along_second - s * along_first - between)
+    return NearestPoints(s, t, t * along_second - s * along_first - between)
 
 
 def _level(aa: Array, safe_aa: Array, ab: Array, aw: Array) -> Array:
@@ -65,7 +67,7 @@ def _dot(left: Array, right: Array) -> Array:
     return left[0] * right[0] + left[1] * right[1] + left[2] * right[2]
 
 
-def normals(nearest: Nearest, along_first: Array, along_second: Array) -> Array:
+def normals(nearest: NearestPoints, along_first: Array, along_second: Array) -> Array:
     """Unit normals (3, K) from the first segment to the second.
 
     Where segments cross the gap has no direction; the common perpendicular is taken (any one

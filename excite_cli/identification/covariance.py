@@ -118,7 +118,7 @@ _UNSTABLE = 1.0 - 1e-9
 
 
 @dataclass(frozen=True)
-class Rows:
+class RunRows:
     """Rows of one run: `columns` (M, n, p), `tau`, `usable` (M, n), `weights` (M, n) or None.
 
     `rounding`: per joint what is uncertain in torques that come in steps (`rounding_of`).
@@ -136,7 +136,7 @@ class Rows:
 
 
 def estimate_covariance(
-    runs: Sequence[Rows], x: Array, inverse: Array, sigma: Array
+    runs: Sequence[RunRows], x: Array, inverse: Array, sigma: Array
 ) -> tuple[Array, float]:
     """Covariance (p, p) of x from the runs it was fitted to, and the effective number of samples.
 
@@ -174,7 +174,7 @@ def estimate_covariance(
     return (matrix + matrix.T) / 2, samples
 
 
-def _meat_of(shared: tuple[Array, Array, Array], run: Rows, tell: Tell) -> tuple[Array, Array]:
+def _meat_of(shared: tuple[Array, Array, Array], run: RunRows, tell: Tell) -> tuple[Array, Array]:
     """What a run adds to the sandwich's inside (p, p), and to white noise's share (p,)."""
     x, inverse, sigma = shared
     residual = run.residual(x)

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 from scipy.special import fdtrc
 
-from excite_cli.identification.covariance import Rows
+from excite_cli.identification.covariance import RunRows
 from excite_cli.identification.factors import run_factors, stacked, together
 from excite_cli.identification.least_squares import fit_rows
 from excite_cli.identification.noise_floor import exact_period
@@ -116,7 +116,7 @@ def _aligned(shared: None, run: Run, tell: Tell) -> Array:
 
 
 def hausman_test(
-    runs: Sequence[Rows], instruments: Sequence[Array], source: Source, noise: Array
+    runs: Sequence[RunRows], instruments: Sequence[Array], source: Source, noise: Array
 ) -> Hausman:
     """Test columns of `runs` against instrument columns, per run (M, n, p); `noise` (n,) [N·m]."""
     p = runs[0].columns.shape[2]
@@ -133,7 +133,7 @@ def hausman_test(
     spool = Spool()
     augmented = each(_augmented, (first_stage, turn), tasks)
     fitted = fit_rows([
-        Rows(spool.keep(columns), run.tau, run.usable)
+        RunRows(spool.keep(columns), run.tau, run.usable)
         for run, columns in zip(runs, augmented, strict=True)
     ])  # fmt: skip
     if not fitted.seen[p:].all():

@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from excite_cli.identification.covariance import Rows, estimate_covariance
+from excite_cli.identification.covariance import RunRows, estimate_covariance
 from excite_cli.identification.factors import (
     Mask,
     Solution,
@@ -53,7 +53,7 @@ class LinearFit:
 
 
 def fit_rows(
-    runs: Sequence[Rows],
+    runs: Sequence[RunRows],
     method: Method = "wls",
     prior: tuple[Array, Array] | None = None,
     sizes: Array | None = None,
@@ -96,7 +96,7 @@ def fit_rows(
     )
 
 
-def factors_of(runs: Sequence[Rows]) -> list[Array]:
+def factors_of(runs: Sequence[RunRows]) -> list[Array]:
     """Factors (n, p+1, p+1) of runs, `together`."""
     tasks = [(run.columns, run.tau, run.usable, run.weights) for run in runs]
     return together(each(_factors, None, tasks))
@@ -106,7 +106,7 @@ def _factors(shared: None, task: tuple[Array, Array, Mask, Array | None], tell: 
     return run_factors(*task)
 
 
-def _without_dust(runs: Sequence[Rows], sizes: Array) -> Sequence[Rows]:
+def _without_dust(runs: Sequence[RunRows], sizes: Array) -> Sequence[RunRows]:
     columns = np.zeros_like(sizes)
     for run in runs:
         columns = np.maximum(columns, np.abs(run.columns).max(axis=(0, 1), initial=0.0))
@@ -150,8 +150,8 @@ def _by_noise(
 
 
 def _reweighted(
-    runs: Sequence[Rows], solution: Solution, floor: Array, extra: Array
-) -> tuple[Sequence[Rows], Array, Solution]:
+    runs: Sequence[RunRows], solution: Solution, floor: Array, extra: Array
+) -> tuple[Sequence[RunRows], Array, Solution]:
     """The runs with Huber's weights, the scale (n,) that they are made of, and their fit."""
     sigma = floor
     for _ in range(_ROUNDS):
@@ -168,7 +168,7 @@ def _reweighted(
     return runs, sigma, solution
 
 
-def _robust_scale(runs: Sequence[Rows], residuals: Sequence[Array]) -> Array:
+def _robust_scale(runs: Sequence[RunRows], residuals: Sequence[Array]) -> Array:
     """Robust standard deviation (n,) of the usable residuals; 0 where there are none."""
     size, usable = np.abs(np.concatenate(residuals)), np.concatenate([run.usable for run in runs])
     return np.array([
@@ -177,7 +177,7 @@ def _robust_scale(runs: Sequence[Rows], residuals: Sequence[Array]) -> Array:
     ])  # fmt: skip
 
 
-def _curvature(runs: Sequence[Rows], x: Array, sigma: Array, extra: Array) -> Array:
+def _curvature(runs: Sequence[RunRows], x: Array, sigma: Array, extra: Array) -> Array:
     """Inverse of Σ c cᵀ/σ² over the rows that count in full."""
     inner = [
         replace(run, weights=None, usable=run.usable & (np.abs(run.residual(x)) <= _HUBER * sigma))

@@ -59,7 +59,7 @@ _LEAST_MASS = 1e-9  # kg
 
 
 @dataclass(frozen=True)
-class Change:
+class LinkParameterChange:
     """One number of a link in the URDF (`before`) and in the fit (`after`), `std` of the latter.
 
     `left`: share of the prior's variance that the data leave, 1 where they say nothing.
@@ -92,8 +92,8 @@ class LinkChange:
 
     link: str
     joint: str
-    mass: Change
-    center: tuple[Change, Change, Change]
+    mass: LinkParameterChange
+    center: tuple[LinkParameterChange, LinkParameterChange, LinkParameterChange]
     marks: tuple[str, ...] = ()
 
     @property
@@ -125,7 +125,8 @@ def link_changes(
         usual = np.sqrt(np.einsum("ij,jk,ik->i", slope, given, slope))
         left = np.minimum(np.square(std / usual), 1.0)
         mass, x, y, z = (
-            Change(*map(float, each)) for each in zip(before, after, std, left, strict=True)
+            LinkParameterChange(*map(float, each))
+            for each in zip(before, after, std, left, strict=True)
         )
         link, joint = body_names(robot, body)
         changes.append(LinkChange(link, joint, mass, (x, y, z)))

@@ -145,7 +145,7 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
     fit = [_averaged(without(of_torque, counted[:, j]), to_full_rate, run, tau, j) for j in joints]
     every = np.ones(len(centers), dtype=bool)
     valid = [
-        _Averaged(averages, np.asarray(of_torque @ tau[:, j]), every)
+        _JointAverages(averages, np.asarray(of_torque @ tau[:, j]), every)
         if recorded[:, j].all()
         else _averaged(without(of_torque, recorded[:, j]), to_full_rate, None, tau, j)
         for j in joints
@@ -207,7 +207,7 @@ def _kept(run: PreparedRun, spool: Spool) -> PreparedRun:
 
 
 @dataclass(frozen=True)
-class _Averaged:
+class _JointAverages:
     """One joint's `averages` (M, T) at the working rate, of its torque (M,), and which are any."""
 
     averages: csr_matrix
@@ -218,13 +218,13 @@ class _Averaged:
 
 def _averaged(
     full: csr_matrix, to_full_rate: csr_matrix, run: Run | None, tau: Array, j: int
-) -> _Averaged:
+) -> _JointAverages:
     """Of averages at the full rate; with `run`, what the steps of its torque leave uncertain."""
     own = (full @ to_full_rate).tocsr()
     rounding = None
     if run is not None and run.torque_step is not None and run.torque_step[j]:
         rounding = rounding_of(full, tau[:, j], float(run.torque_step[j]))
-    return _Averaged(own, np.asarray(full @ tau[:, j]), filled(full) & filled(own), rounding)
+    return _JointAverages(own, np.asarray(full @ tau[:, j]), filled(full) & filled(own), rounding)
 
 
 def _positions(run: Run, processing: Processing, fs: float) -> Array:

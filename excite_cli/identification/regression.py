@@ -10,7 +10,7 @@ from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
-from excite_cli.identification.covariance import Rows
+from excite_cli.identification.covariance import RunRows
 from excite_cli.identification.declared_states import LeftOut
 from excite_cli.identification.prepare import PreparedRun, prepare_all
 from excite_cli.identification.processing import Processing
@@ -49,10 +49,10 @@ class RunColumns:
         return self.columns[:, :, self.rank :]
 
     @property
-    def rows(self) -> Rows:
+    def rows(self) -> RunRows:
         """Rows for the least-squares fit."""
         own = self.prepared
-        return Rows(self.columns, self.tau, own.usable, rounding=own.rounding)
+        return RunRows(self.columns, self.tau, own.usable, rounding=own.rounding)
 
 
 @dataclass(frozen=True)

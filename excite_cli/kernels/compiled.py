@@ -13,7 +13,7 @@ import os
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.kernels.arguments import CheckedFunction
+from excite_cli.kernels.array_arguments import CheckedFunction
 from excite_cli.kernels.signatures import SIGNATURES
 
 Array = NDArray[np.float64]

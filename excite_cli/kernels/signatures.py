@@ -7,7 +7,7 @@ What index arrays hold is not looked at: that would take longer than some of the
 
 import numpy as np
 
-from excite_cli.kernels.arguments import Array, Number, Size, Sum
+from excite_cli.kernels.array_arguments import Array, Number, Size, Sum
 
 _FLOAT, _WHOLE = np.dtype(np.float64), np.dtype(np.int64)
 

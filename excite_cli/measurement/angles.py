@@ -9,7 +9,7 @@ import numpy as np
 
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
-from excite_cli.measurement.limits import Limits
+from excite_cli.measurement.recording_limits import RecordingLimits
 from excite_cli.measurement.speeds import Speeds, extremes, following, usual_gain
 
 _DEGREES, _RPM = 180 / np.pi, 30 / np.pi
@@ -24,7 +24,7 @@ def check_angles(
     found: Speeds,
     joints: tuple[str, ...],
     spec: MeasurementSpec,
-    limits: Limits,
+    limits: RecordingLimits,
     where: str,
 ) -> list[Finding]:
     """At most one finding about equidistant runs, whose speeds are `found`."""
@@ -34,7 +34,11 @@ def check_angles(
 
 
 def _angle_by_speed(
-    found: Speeds, joints: tuple[str, ...], spec: MeasurementSpec, limits: Limits, where: str
+    found: Speeds,
+    joints: tuple[str, ...],
+    spec: MeasurementSpec,
+    limits: RecordingLimits,
+    where: str,
 ) -> list[Finding]:
     gain = usual_gain(found, limits.revolute)
     leave = "leave the speeds out (measurement.channels: {dq: null})"
@@ -72,7 +76,7 @@ def _angle_by_limits(
     found: Speeds,
     joints: tuple[str, ...],
     spec: MeasurementSpec,
-    limits: Limits,
+    limits: RecordingLimits,
     where: str,
 ) -> list[Finding]:
     lowest, highest = extremes(runs)

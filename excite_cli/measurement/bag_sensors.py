@@ -108,7 +108,7 @@ class SensorMessages:
         self._stamps.add(recorded, message.header.stamp)
         self._values.append(_READINGS[self.channel.kind].values(message))
 
-    def at(self, stamps: Stamps) -> "Sampled":
+    def at(self, stamps: Stamps) -> "SampledChannel":
         """Values at the stamps [ns] of joint states.
 
         Raises
@@ -133,7 +133,9 @@ class SensorMessages:
         found = np.column_stack([np.interp(wanted, t, column) for column in values.T])
         if of_pose:
             found[:, 3:] /= np.linalg.norm(found[:, 3:], axis=1, keepdims=True)
-        return Sampled(self.channel.name, found, within, self._findings(unstamped, t, within))
+        return SampledChannel(
+            self.channel.name, found, within, self._findings(unstamped, t, within)
+        )
 
     def _refuse_restart(self, t: Array) -> None:
         steps = np.diff(t)
@@ -197,7 +199,7 @@ class SensorMessages:
 
 
 @dataclass(frozen=True)
-class Sampled:
+class SampledChannel:
     """A channel `name` at the stamps of joint states: (T, width), and where it is known (T,)."""
 
     name: str
@@ -206,7 +208,7 @@ class Sampled:
     findings: tuple[Finding, ...]
 
 
-def with_sensors(path: Path, raw: RawRun, sampled: Sequence[Sampled]) -> RawRun:
+def with_sensors(path: Path, raw: RawRun, sampled: Sequence[SampledChannel]) -> RawRun:
     """The run with these channels, cut to where all of them are known.
 
     Raises

@@ -17,13 +17,13 @@ from excite_cli.measurement.csv_reader import CsvReader
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
 from excite_cli.measurement.hdf5_reader import Hdf5Reader
 from excite_cli.measurement.joined_files import is_part, with_joined
-from excite_cli.measurement.limits import Limits
 from excite_cli.measurement.mat_reader import MatReader
 from excite_cli.measurement.missing_values import known_stamps
 from excite_cli.measurement.motors import Motors
 from excite_cli.measurement.parquet_reader import ParquetReader
 from excite_cli.measurement.quality import checked
 from excite_cli.measurement.reader import SINCE_1970, RawRun, Reader, ReadOptions
+from excite_cli.measurement.recording_limits import RecordingLimits
 from excite_cli.measurement.run_identity import Origin
 from excite_cli.measurement.torque import SECONDS, check_joints, check_motors, declared, to_joints
 from excite_cli.out_of_core import Spool
@@ -78,9 +78,9 @@ def read_dataset(
         check_motors(spec, motors)
     turning = np.ones(len(joint_names), bool) if revolute is None else np.asarray(revolute, bool)
     known = (
-        Limits(*limits, turning)
+        RecordingLimits(*limits, turning)
         if limits is not None
-        else replace(Limits.unknown(len(joint_names)), revolute=turning)
+        else replace(RecordingLimits.unknown(len(joint_names)), revolute=turning)
     )
     channels: dict[str, str | None] = {str(key): name for key, name in spec.channels.items()}
     options = ReadOptions(
@@ -146,7 +146,7 @@ def _recordings(paths: Sequence[Path], options: ReadOptions) -> Iterator[tuple[P
 
 
 def _checked(
-    about: tuple[MeasurementSpec, tuple[str, ...], Limits],
+    about: tuple[MeasurementSpec, tuple[str, ...], RecordingLimits],
     task: tuple[Path, list[Run]],
     tell: Tell,
 ) -> tuple[list[Run], list[Finding]]:

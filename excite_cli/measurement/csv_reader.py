@@ -9,7 +9,7 @@ import numpy as np
 
 from excite_cli.errors import FileError, nearest
 from excite_cli.measurement.arrange import listed
-from excite_cli.measurement.csv_table import Table, read_table
+from excite_cli.measurement.csv_table import NamedColumns, read_table
 from excite_cli.measurement.dataset import Array, Finding
 from excite_cli.measurement.reader import (
     CHANNELS,
@@ -116,7 +116,7 @@ class CsvReader(Reader):
         return [run_of_table(path, read_table(path), wanted)]
 
 
-def run_of_table(path: Path, table: Table, wanted: ReadOptions) -> RawRun:
+def run_of_table(path: Path, table: NamedColumns, wanted: ReadOptions) -> RawRun:
     """The run in a table whose columns `<channel>_<joint>` are matched by name.
 
     Raises

@@ -34,7 +34,7 @@ _DECIMAL_COMMA = re.compile(r"\d,\d")
 
 
 @dataclass(frozen=True)
-class Table:
+class NamedColumns:
     """Named columns (T,) of numbers; NaN where a field was empty; `words`: columns of one word."""
 
     columns: dict[str, Array]
@@ -58,7 +58,7 @@ def header_of(path: Path) -> tuple[str, ...]:
         return ()
 
 
-def read_table(path: Path) -> Table:
+def read_table(path: Path) -> NamedColumns:
     """Read a `.csv` or `.csv.gz`; comma, semicolon, tab or white space between columns.
 
     Raises
@@ -85,7 +85,7 @@ def read_table(path: Path) -> Table:
     if layout.decimal_comma:
         text = "numbers are written with a decimal comma; read so"
         findings.append(Finding("decimal_comma", "note", text))
-    return Table(values, tuple(findings), words)
+    return NamedColumns(values, tuple(findings), words)
 
 
 def _lines(path: Path) -> Iterator[str]:

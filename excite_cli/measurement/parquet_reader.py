@@ -1,6 +1,7 @@
 """Parquet: a table with a column per channel, named as in a CSV, or a dataset of LeRobot."""
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -8,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from excite_cli.errors import ExciteError, FileError, MissingExtraError
-from excite_cli.measurement import lerobot
 from excite_cli.measurement.arrange import listed
 from excite_cli.measurement.csv_reader import run_of_table
-from excite_cli.measurement.csv_table import Table
+from excite_cli.measurement.csv_table import NamedColumns
 from excite_cli.measurement.dataset import Array, Finding
 from excite_cli.measurement.memory_limit import is_shortage, limited_memory, short_of_memory
 from excite_cli.measurement.reader import (
@@ -22,6 +22,88 @@ from excite_cli.measurement.reader import (
     check_unpacked,
     check_values,
 )
+
+# LeRobot's datasets: their files, and their columns in our names.
+#
+# `data/chunk-000/` has a file per episode (`episode_000000.parquet`, 2.1) or of several
+# (`file-000`, 3.0); `meta/info.json` names the entries of a column, as `elbow.pos`, `elbow.torque` or `elbow`.
+
+STATE = "observation.state"
+EPISODE = "episode_index"
+_COUNTS = (EPISODE, "frame_index", "index", "task_index")
+# Of the joints of the state; the other columns keep their names.
+_FEATURES = {"velocity": "dq", "effort": "tau", "torque": "tau", "current": "current"}
+_ENDINGS = {
+    "pos": "q", "q": "q", "vel": "dq", "dq": "dq", "torque": "tau", "effort": "tau", "tau": "tau",
+    "current": "current",
+}  # fmt: skip
+_MAX_INFO = 2**24  # bytes
+
+
+def files_of(folder: Path) -> list[Path]:
+    """Files of a dataset's folder, in the order of its episodes; none where it is no dataset."""
+    is_dataset = (folder / "meta" / "info.json").is_file()
+    return sorted(folder.glob("data/*/*.parquet")) if is_dataset else []
+
+
+def in_our_names(path: Path, columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Columns (T,) as `t` [s], `q_<joint>`, `dq_<joint>`, `tau_<joint>`, and what else there is."""
+    features = _features(path)
+    found: dict[str, Array] = {}
+    for feature, values in columns.items():
+        if feature == "timestamp" and values.ndim == 1:
+            found["t"] = values
+        elif feature not in _COUNTS and not feature.startswith("next."):
+            matrix = values.reshape(len(values), -1)
+            names = _entries(features, feature, matrix.shape[1])
+            for name, column in zip(names, matrix.T, strict=True):
+                found[name if name not in found else f"{feature}.{name}"] = column
+    return found
+
+
+def _entries(features: Mapping[str, Any], feature: str, width: int) -> Iterator[str]:
+    """What the entries of a column are called; they carry numbers where nothing names them."""
+    short = feature.removeprefix("observation.")
+    sources = (feature, STATE) if short in _FEATURES else (feature,)
+    named = (_listed(features.get(source)) for source in sources)
+    numbers = [str(k + 1) for k in range(width)]
+    for entry in next((names for names in named if len({*names}) == len(names) == width), numbers):
+        joint, _, ending = entry.rpartition(".")
+        if not joint or ending not in _ENDINGS:
+            joint, ending = entry, "pos"
+        channel = _ENDINGS[ending] if feature == STATE else _FEATURES.get(short, short)
+        yield f"{channel}_{joint}"
+
+
+def _listed(feature: Any) -> list[str]:
+    """Names of a feature: a list, one in a list, `{"motors": […]}`, or `{name: its number}`."""
+    names = feature.get("names") if isinstance(feature, dict) else None
+    if isinstance(names, dict) and all(isinstance(each, int) for each in names.values()):
+        names = sorted(names, key=names.__getitem__)
+    elif isinstance(names, dict):
+        names = list(names.values())
+    while isinstance(names, list) and len(names) == 1 and isinstance(names[0], list):
+        names = names[0]
+    good = isinstance(names, list) and all(isinstance(each, str) for each in names)
+    return names if isinstance(names, list) and good else []
+
+
+def _features(path: Path) -> Mapping[str, Any]:
+    """What `meta/info.json` says of the columns; nothing where it is not beside `data`."""
+    beside = (folder / "meta" / "info.json" for folder in path.absolute().parents[:3])
+    info = next((each for each in beside if each.is_file()), None)
+    if info is None:
+        return {}
+    try:
+        if info.stat().st_size > _MAX_INFO:
+            raise ValueError(f"more than {_MAX_INFO // 2**20} MiB")
+        return dict(json.loads(info.read_text(encoding="utf-8"))["features"])
+    except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
+        raise FileError(
+            f"{info} does not describe LeRobot's columns ({error!s:.200}). Restore it; without it "
+            "columns carry numbers, which stand for the moved joints in their order."
+        ) from error
+
 
 # Tables of parquet: columns of numbers, and lists of numbers of one length, which are matrices.
 
@@ -137,13 +219,13 @@ class ParquetReader(Reader):
 
     def recognises(self, path: Path) -> bool:
         """Files by their suffix; folders that hold a dataset of LeRobot."""
-        return bool(lerobot.files_of(path)) if path.is_dir() else super().recognises(path)
+        return bool(files_of(path)) if path.is_dir() else super().recognises(path)
 
     def read(self, path: Path, wanted: ReadOptions) -> list[RawRun]:
         """The runs, in the order of the files."""
         runs: list[RawRun] = []
         count = 0
-        for file in lerobot.files_of(path) if path.is_dir() else [path]:
+        for file in files_of(path) if path.is_dir() else [path]:
             table = read_parquet(file)
             count += sum(values.size for values in table.columns.values())
             check_values(path, count)
@@ -160,21 +242,21 @@ class ParquetReader(Reader):
 def _runs(path: Path, table: ParquetTable, wanted: ReadOptions) -> Iterator[RawRun]:
     text = f"not numbers per sample, left out: {listed(table.skipped)}"
     findings = (Finding("left_out", "note", text),) if table.skipped else ()
-    if lerobot.STATE not in table.columns:
-        yield run_of_table(path, Table(dict(_flat(table.columns)), findings), wanted)
+    if STATE not in table.columns:
+        yield run_of_table(path, NamedColumns(dict(_flat(table.columns)), findings), wanted)
         return
-    columns = lerobot.in_our_names(path, table.columns)
-    episodes = table.columns.get(lerobot.EPISODE, np.zeros(len(next(iter(columns.values())))))
+    columns = in_our_names(path, table.columns)
+    episodes = table.columns.get(EPISODE, np.zeros(len(next(iter(columns.values())))))
     if episodes.ndim > 1 or not np.isfinite(episodes).all():
-        raise FileError(f"{path}: '{lerobot.EPISODE}' must be a number in every row.")
+        raise FileError(f"{path}: '{EPISODE}' must be a number in every row.")
     for number in np.unique(episodes):
         rows = episodes == number
         own = {name: values[rows] for name, values in columns.items()}
-        run = run_of_table(path, Table(own, findings), wanted)
+        run = run_of_table(path, NamedColumns(own, findings), wanted)
         if any(not run.columns.get(channel) for channel in wanted.needed):
             raise FileError(_no_torques(path, columns))
         name = f"episode_{int(number):06d}"
-        yield replace(run, name=name, place=f"{lerobot.EPISODE} {number:.0f}", seconds=True)
+        yield replace(run, name=name, place=f"{EPISODE} {number:.0f}", seconds=True)
 
 
 def _flat(columns: dict[str, Array]) -> Iterator[tuple[str, Array]]:

@@ -16,8 +16,8 @@ from excite_cli.errors import FileError
 from excite_cli.measurement.covariates import without_missing_covariates
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Mask, Run, merged
 from excite_cli.measurement.dead_channels import dead_channels
-from excite_cli.measurement.limits import Limits
 from excite_cli.measurement.missing_values import without_missing
+from excite_cli.measurement.recording_limits import RecordingLimits
 from excite_cli.measurement.resolution import with_torque_steps
 from excite_cli.measurement.speed_lag import check_lag
 from excite_cli.measurement.speeds import speeds
@@ -147,7 +147,7 @@ _STEP = 0.02  # rad: so much a step may be whatever the others are
 
 
 def unwrapped(
-    runs: Sequence[Run], joints: tuple[str, ...], limits: Limits
+    runs: Sequence[Run], joints: tuple[str, ...], limits: RecordingLimits
 ) -> tuple[list[Run], list[Finding]]:
     """Runs whose positions are continuous, and where they were not."""
     found, told = [], []
@@ -187,7 +187,7 @@ def _within(q: Array, lower: float, upper: float) -> Array:
 
 
 def checked(
-    runs: Sequence[Run], spec: MeasurementSpec, joints: tuple[str, ...], limits: Limits
+    runs: Sequence[Run], spec: MeasurementSpec, joints: tuple[str, ...], limits: RecordingLimits
 ) -> tuple[list[Run], list[Finding]]:
     """Runs of one file, equidistant and masked, with everything that was seen and done."""
     findings: list[Finding] = []

@@ -11,7 +11,7 @@ import numpy as np
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.measurement.angles import check_angles
 from excite_cli.measurement.dataset import Finding, Run
-from excite_cli.measurement.limits import Limits
+from excite_cli.measurement.recording_limits import RecordingLimits
 from excite_cli.measurement.speeds import Speeds, check_clock, extremes, speeds, usual_gain
 from excite_cli.measurement.torque import METERS, SECONDS
 
@@ -26,7 +26,7 @@ _USUAL_SPEED = 3.0  # rad/s, of a robot without a limit
 
 
 def check_units(
-    runs: Sequence[Run], spec: MeasurementSpec, joints: tuple[str, ...], limits: Limits
+    runs: Sequence[Run], spec: MeasurementSpec, joints: tuple[str, ...], limits: RecordingLimits
 ) -> list[Finding]:
     """Findings about time, angles and torque of equidistant runs of one file."""
     found = speeds(runs)
@@ -62,7 +62,7 @@ def _time_by_speed(found: Speeds, spec: MeasurementSpec, where: str) -> list[Fin
 
 
 def _time_by_limits(
-    runs: Sequence[Run], found: Speeds, spec: MeasurementSpec, limits: Limits, where: str
+    runs: Sequence[Run], found: Speeds, spec: MeasurementSpec, limits: RecordingLimits, where: str
 ) -> list[Finding]:
     """Without recorded speeds: rate and speed must both be absurd, and sensible in another unit."""
     if found.recorded is not None:
@@ -99,7 +99,7 @@ def _length_by_limits(
     runs: Sequence[Run],
     joints: tuple[str, ...],
     spec: MeasurementSpec,
-    limits: Limits,
+    limits: RecordingLimits,
     where: str,
 ) -> list[Finding]:
     """Of joints that slide: positions far beyond the limits, which keep them in mm or cm."""
@@ -145,7 +145,7 @@ def _odd_gains(
 
 
 def _outside(
-    runs: Sequence[Run], joints: tuple[str, ...], limits: Limits, where: str
+    runs: Sequence[Run], joints: tuple[str, ...], limits: RecordingLimits, where: str
 ) -> list[Finding]:
     lowest, highest = extremes(runs)
     span = np.where(np.isfinite(limits.upper - limits.lower), limits.upper - limits.lower, 0.0)
@@ -162,7 +162,7 @@ def _outside(
 
 
 def _torque(
-    runs: Sequence[Run], joints: tuple[str, ...], limits: Limits, where: str
+    runs: Sequence[Run], joints: tuple[str, ...], limits: RecordingLimits, where: str
 ) -> list[Finding]:
     """Only a note: effort limits in URDFs are often placeholders."""
     largest = np.max([np.abs(run.tau).max(axis=0) for run in runs], axis=0)

@@ -77,7 +77,7 @@ class Provable(Protocol):
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ProofVerdict:
     """What is known of one constraint along a whole motion.
 
     `lacking` (m,): by how much each column falls short at the worst instant seen (a trifle where
@@ -122,7 +122,7 @@ class Path:
         return EnclosedMotion(self.robot, states)
 
 
-def certify(path: Path, constraints: Sequence[Provable]) -> tuple[Verdict, ...]:
+def certify(path: Path, constraints: Sequence[Provable]) -> tuple[ProofVerdict, ...]:
     """A verdict on every constraint, in their order."""
     intervals = intervals_of(path.trajectory, _WIDTH)
     open_: list[list[Intervals]] = [[] for _ in constraints]
@@ -148,13 +148,13 @@ def _doubtful(least: Array, constraint: Provable) -> NDArray[np.bool_]:
     return np.asarray(~(least >= -constraint.rounding).all(axis=1))
 
 
-def _unknown(constraint: Provable) -> Verdict:
+def _unknown(constraint: Provable) -> ProofVerdict:
     nothing = np.zeros(len(constraint.labels))
     reason = "no bound between instants is known for it"
-    return Verdict(constraint.name, "sampled", nothing, reason, bounded=False)
+    return ProofVerdict(constraint.name, "sampled", nothing, reason, bounded=False)
 
 
-def _settled(path: Path, constraint: Provable, open_: list[Intervals]) -> Verdict:
+def _settled(path: Path, constraint: Provable, open_: list[Intervals]) -> ProofVerdict:
     """Cut what is open until it is proved, or seen to be broken."""
     lacking = np.zeros(len(constraint.labels))
     seen = _Seen(constraint)
@@ -178,7 +178,7 @@ def _settled(path: Path, constraint: Provable, open_: list[Intervals]) -> Verdic
     if len(pending):
         thin = "the margin is too small to be distinguished from zero"
         return seen.verdict("sampled", lacking, thin)
-    return Verdict(constraint.name, "proved", lacking)
+    return ProofVerdict(constraint.name, "proved", lacking)
 
 
 def _still_open(
@@ -210,9 +210,9 @@ class _Seen:
             self._share, self._margin = worst.share, worst.margin
             self._label, self._time = worst.label, worst.time
 
-    def verdict(self, state: State, lacking: Array, reason: str) -> Verdict:
+    def verdict(self, state: State, lacking: Array, reason: str) -> ProofVerdict:
         name = self._constraint.name
-        return Verdict(name, state, lacking, reason, self._label, self._time, self._margin)
+        return ProofVerdict(name, state, lacking, reason, self._label, self._time, self._margin)
 
 
 def _joined(parts: list[Intervals]) -> Intervals:

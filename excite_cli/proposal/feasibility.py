@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.config.load import parsed_spec
+from excite_cli.config.load_spec import parsed_spec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.joint_columns import Quantity
 from excite_cli.constraints.mesh_clearance import MeshClearance
@@ -34,7 +34,7 @@ from excite_cli.geometry.collision_pairs import CollisionPairs
 from excite_cli.geometry.mesh_distances import MeshDistances
 from excite_cli.geometry.mesh_pairs import joined_links
 from excite_cli.geometry.pair_tables import near_at_posture
-from excite_cli.proposal.limits import JointPlan
+from excite_cli.proposal.assumed_limits import JointPlan
 from excite_cli.robot.carried_bodies import MovedBodies
 
 # A posture to start from: one that others wrote down, bent and away from limits, then clear.
@@ -88,7 +88,7 @@ _DIGITS, _FINE_DIGITS = 4, 8
 
 
 @dataclass(frozen=True)
-class Settled:
+class FeasibleProblem:
     """A problem that has a clear posture: its tree, with comments, and what it was built of."""
 
     tree: Tree
@@ -97,7 +97,7 @@ class Settled:
     start: Start
 
 
-def settle(tree: Tree, comments: Comments, folder: Path) -> Settled:
+def settle(tree: Tree, comments: Comments, folder: Path) -> FeasibleProblem:
     """Find a clear posture, giving way where there is none; paths start from `folder`.
 
     Raises
@@ -129,7 +129,7 @@ def settle(tree: Tree, comments: Comments, folder: Path) -> Settled:
         if moved:
             comments["robot", "posture"] += ", moved until capsules, limits and torques have room"
         robot = replace(problem.robot, posture=posture)
-        return Settled(tree, comments, replace(problem, robot=robot), start)
+        return FeasibleProblem(tree, comments, replace(problem, robot=robot), start)
     raise NoAdmissibleMotionError("No clear posture was found, although limits were loosened.")
 
 

@@ -73,7 +73,7 @@ _TOLD = 6
 
 
 @dataclass(frozen=True)
-class Choice:
+class JointChoice:
     """Joints to move, in the order of the URDF, and the others by the reason why not.
 
     `followers`: joints that move with one that is chosen, by its name.
@@ -90,7 +90,9 @@ class Choice:
         return (*left, *led)
 
 
-def choose_joints(joints: Iterable[UrdfJoint], source: str, asked: tuple[str, ...] = ()) -> Choice:
+def choose_joints(
+    joints: Iterable[UrdfJoint], source: str, asked: tuple[str, ...] = ()
+) -> JointChoice:
     """The joints to move; those `asked` for where any are.
 
     Raises
@@ -128,7 +130,7 @@ def choose_joints(joints: Iterable[UrdfJoint], source: str, asked: tuple[str, ..
             f"{source} has no arm, leg or hand to move, only {reasons}. Name joints with --joints "
             "if they are meant all the same."
         )
-    return Choice(tuple(kept), left_out, _followers(kept, joints))
+    return JointChoice(tuple(kept), left_out, _followers(kept, joints))
 
 
 def _followers(
@@ -212,7 +214,7 @@ def _everywhere(joints: tuple[UrdfJoint, ...]) -> set[str]:
     return set.intersection(*(_words(joint.name) for joint in joints))
 
 
-def _as_asked(joints: tuple[UrdfJoint, ...], asked: tuple[str, ...]) -> Choice:
+def _as_asked(joints: tuple[UrdfJoint, ...], asked: tuple[str, ...]) -> JointChoice:
     known = {joint.name: joint for joint in joints}
     for name in asked:
         if name not in known:
@@ -242,7 +244,7 @@ def _as_asked(joints: tuple[UrdfJoint, ...], asked: tuple[str, ...]) -> Choice:
     followers = _followers(chosen, joints)
     moved = {*asked, *(name for names in followers.values() for name in names)}
     others = tuple(joint.name for joint in joints if joint.name not in moved)
-    return Choice(chosen, {"not requested": others} if others else {}, followers)
+    return JointChoice(chosen, {"not requested": others} if others else {}, followers)
 
 
 def _listed(names: tuple[str, ...]) -> str:

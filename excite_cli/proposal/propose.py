@@ -8,20 +8,20 @@ from pathlib import Path
 from typing import Literal
 
 from excite_cli.config.commented_yaml import commented_yaml
-from excite_cli.config.load import apply_override, parse_spec, parsed_spec
+from excite_cli.config.load_spec import apply_override, parse_spec, parsed_spec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.errors import ConfigError, RobotError
+from excite_cli.proposal.assumed_limits import MOST_ACCELERATION, JointPlan, plan_limits
 from excite_cli.proposal.disabled_pairs import chosen_srdf, disabled_pairs
 from excite_cli.proposal.feasibility import (
     Comments,
+    FeasibleProblem,
     FirstPosture,
-    Settled,
     Tree,
     first_posture,
     settle,
 )
-from excite_cli.proposal.joints import Choice, choose_joints
-from excite_cli.proposal.limits import MOST_ACCELERATION, JointPlan, plan_limits
+from excite_cli.proposal.joints import JointChoice, choose_joints
 from excite_cli.proposal.shapes import Shapes, choose_shapes
 from excite_cli.proposal.timing import Pace, choose_pace
 from excite_cli.robot.assumed_inertias import with_assumed_inertias
@@ -85,7 +85,7 @@ class Proposal(Shown):
     joints: tuple[str, ...]
     left_out: dict[str, tuple[str, ...]]
     notes: tuple[str, ...]
-    settled: Settled
+    settled: FeasibleProblem
 
 
 def propose(request: Request) -> Proposal:
@@ -166,7 +166,7 @@ def _draft(
     request: Request,
     dirs: tuple[str, ...],
     shapes: Shapes,
-    choice: Choice,
+    choice: JointChoice,
     joints: tuple[JointPlan, ...],
     posture: FirstPosture,
     pace: Pace,

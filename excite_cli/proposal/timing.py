@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.proposal.limits import JointPlan
+from excite_cli.proposal.assumed_limits import JointPlan
 from excite_cli.trajectory.freedom import harmonics_for
 
 _SHORTEST, _LONGEST = 10.0, 20.0

@@ -10,7 +10,7 @@ from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.identification.stored_model import StoredFit
-from excite_cli.report.campaign import Campaign
+from excite_cli.report.campaign import RebuiltResult
 from excite_cli.report.compare_section import (
     comparable,
     compare_diagnoses,
@@ -23,27 +23,27 @@ from excite_cli.report.diagnosis_sections import diagnosis_figures, diagnosis_se
 from excite_cli.report.fit_sections import fit_figures, fit_sections
 from excite_cli.report.margin_section import margin_figures, margin_section
 from excite_cli.report.motion_section import motion_section
-from excite_cli.report.page import KeyFigure, Page, Section, Table, Text
+from excite_cli.report.page import KeyFigure, Page, PageSection, TableBlock, Text
 from excite_cli.report.score_sections import score_figures, score_sections, table_of
 from excite_cli.report.weakest_section import weakest_section
 from excite_cli.scoring.records import Score
-from excite_cli.summary.inspection import Inspected, checks_table, counted, headline, remarks
+from excite_cli.summary.inspection import AnyInspection, checks_table, counted, headline, remarks
 from excite_cli.summary.pairs import doubts_in_words
 from excite_cli.summary.score import sentences
 
 # The page of an inspection: what of log and model is fine, doubtful or wrong, and its cure.
 
 
-def inspection_page(found: Inspected, title: str) -> Page:
+def inspection_page(found: AnyInspection, title: str) -> Page:
     """The table of all checks, the evidence of what is not fine, and what would be set."""
     faults, doubts, _ = counted(found)
-    sections = [Section("checks", "Checks", (table_of(checks_table(found)),))]
+    sections = [PageSection("checks", "Checks", (table_of(checks_table(found)),))]
     if texts := remarks(found):
-        sections.append(Section("evidence", "Evidence", tuple(map(Text, texts))))
+        sections.append(PageSection("evidence", "Evidence", tuple(map(Text, texts))))
     if found.settings:
         rows = tuple((key, written({key: value})) for key, value in found.settings.items())
-        cures = Table(("key", "line that inspect --apply writes"), rows, wordy=frozenset({1}))
-        sections.append(Section("settings", "What would change in the config", (cures,)))
+        cures = TableBlock(("key", "line that inspect --apply writes"), rows, wordy=frozenset({1}))
+        sections.append(PageSection("settings", "What would change in the config", (cures,)))
     return Page(
         title,
         "Log and model: set-up checks",
@@ -56,12 +56,12 @@ def inspection_page(found: Inspected, title: str) -> Page:
 # All that a page says about one result file, in reading order.
 
 
-def campaign_figures(campaign: Campaign) -> tuple[KeyFigure, ...]:
+def campaign_figures(campaign: RebuiltResult) -> tuple[KeyFigure, ...]:
     """What sums it up."""
     return (*condition_figures(campaign), *margin_figures(campaign))
 
 
-def campaign_sections(campaign: Campaign, picture: bool = True) -> tuple[Section, ...]:
+def campaign_sections(campaign: RebuiltResult, picture: bool = True) -> tuple[PageSection, ...]:
     """Condition numbers, what shows least, motions, margins, how it was made."""
     return (
         condition_section(campaign, picture),
@@ -93,7 +93,7 @@ class _Part:
 
     source: Source
     figures: tuple[KeyFigure, ...]
-    sections: tuple[Section, ...]
+    sections: tuple[PageSection, ...]
     answers: tuple[Text, ...] = ()
 
 
@@ -118,19 +118,19 @@ def page_of(sources: Sequence[Source], show: Callable[[str, int], None]) -> Page
     )
 
 
-def _campaigns(sources: Sequence[Source]) -> dict[str, Campaign]:
-    found: dict[str, Campaign] = {}
+def _campaigns(sources: Sequence[Source]) -> dict[str, RebuiltResult]:
+    found: dict[str, RebuiltResult] = {}
     count = sum(isinstance(source.content, Result) for source in sources)
     for source in sources:
         if isinstance(source.content, Result):
             assert source.problem is not None, "a result is reported with its problem"
             number, alone = len(found) + 1, count == 1
-            campaign = Campaign(source.name, source.content, source.problem, number, alone)
+            campaign = RebuiltResult(source.name, source.content, source.problem, number, alone)
             found[source.name] = campaign
     return found
 
 
-def _part(source: Source, campaign: Campaign | None) -> _Part:
+def _part(source: Source, campaign: RebuiltResult | None) -> _Part:
     content = source.content
     if campaign is not None:
         sections = campaign_sections(campaign, source.picture)
@@ -176,11 +176,13 @@ def _distinct(parts: Sequence[_Part]) -> list[_Part]:
     return found
 
 
-def _compared(sources: Sequence[Source], campaigns: dict[str, Campaign]) -> tuple[Section, ...]:
+def _compared(
+    sources: Sequence[Source], campaigns: dict[str, RebuiltResult]
+) -> tuple[PageSection, ...]:
     """Sections that put several files of a kind side by side."""
     fits = {s.name: s.content for s in sources if isinstance(s.content, StoredFit)}
     diagnoses = {s.name: s.content for s in sources if isinstance(s.content, Diagnosis)}
-    sections: list[Section] = []
+    sections: list[PageSection] = []
     if len(campaigns) > 1:
         sections.append(compare_results(list(campaigns.values())))
     if len(fits) > 1:

@@ -7,7 +7,7 @@ from excite_cli.excitation.result import Result
 
 
 @dataclass(frozen=True)
-class Campaign:
+class RebuiltResult:
     """A result with its rebuilt problem.
 
     `name` is that of the file. `number` counts the campaigns of a page from one; `alone` tells

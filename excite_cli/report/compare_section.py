@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.identification.stored_model import StoredFit
-from excite_cli.report.campaign import Campaign, in_figures
+from excite_cli.report.campaign import RebuiltResult, in_figures
 from excite_cli.report.chart import Colour
-from excite_cli.report.page import Block, Charts, Section, Table, Text
-from excite_cli.report.plot import Panel, Plot, Series
+from excite_cli.report.page import Block, Charts, PageSection, TableBlock, Text
+from excite_cli.report.plot import Curve, Panel, Plot
 
 # Which keys of several configs differ, with their values.
 
@@ -45,7 +45,7 @@ def differences(names: Sequence[str], configs: Sequence[str]) -> Block:
     differing = tuple(row for row in rows if len(set(row[1:])) > 1)
     if not differing:
         return Text("The configs are the same, key by key.")
-    return Table(("key", *names), differing, title="What differs in the configs")
+    return TableBlock(("key", *names), differing, title="What differs in the configs")
 
 
 def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -75,7 +75,7 @@ _COLOURS: tuple[Colour, ...] = ("blue", "vermilion", "green", "purple")
 _HEIGHT = 200  # px
 
 
-def compare_results(campaigns: Sequence[Campaign]) -> Section:
+def compare_results(campaigns: Sequence[RebuiltResult]) -> PageSection:
     """Condition numbers, worst margins and the differing keys of several result files."""
     names = [campaign.name for campaign in campaigns]
     configs = [campaign.result.config for campaign in campaigns]
@@ -85,15 +85,17 @@ def compare_results(campaigns: Sequence[Campaign]) -> Section:
         differences(names, configs),
     )
     if not comparable(campaigns):
-        return Section("compare", "Results side by side", (Text(_NOT_COMPARABLE, "bad"), *tables))
+        return PageSection(
+            "compare", "Results side by side", (Text(_NOT_COMPARABLE, "bad"), *tables)
+        )
     best = min(campaigns, key=_reached)
     lead = "; ".join(f"{c.name}: {in_figures(_reached(c))} after {c.motions}" for c in campaigns)
     blocks: tuple[Block, ...] = (Charts((_chart(campaigns),)), *tables)
     lead = f"{lead}. Lowest: {best.name}."
-    return Section("compare", "Results side by side", blocks, lead)
+    return PageSection("compare", "Results side by side", blocks, lead)
 
 
-def comparable(campaigns: Sequence[Campaign]) -> bool:
+def comparable(campaigns: Sequence[RebuiltResult]) -> bool:
     """Whether condition numbers are about the same columns in the same scale."""
     results = [campaign.result for campaign in campaigns]
     return all(
@@ -105,11 +107,11 @@ def comparable(campaigns: Sequence[Campaign]) -> bool:
     )
 
 
-def _reached(campaign: Campaign) -> float:
+def _reached(campaign: RebuiltResult) -> float:
     return campaign.result.motions[-1].stacked_condition_number
 
 
-def _chart(campaigns: Sequence[Campaign]) -> Plot:
+def _chart(campaigns: Sequence[RebuiltResult]) -> Plot:
     """Stacked condition numbers by the number of motions; a file goes on where its prior ends."""
     offsets = [_before(campaign, campaigns) for campaign in campaigns]
     lines = [
@@ -121,7 +123,7 @@ def _chart(campaigns: Sequence[Campaign]) -> Plot:
     for number, (campaign, offset, line) in enumerate(zip(campaigns, offsets, lines, strict=True)):
         y = np.full(count, np.nan)
         y[offset : offset + len(line)] = np.where(np.isfinite(line), line, np.nan)
-        series.append(Series(_cut(campaign.name), y, _COLOURS[number % len(_COLOURS)], "joined"))
+        series.append(Curve(_cut(campaign.name), y, _COLOURS[number % len(_COLOURS)], "joined"))
     said = "; ".join(
         f"{campaign.name}: {', '.join(map(in_figures, line))}"
         for campaign, line in zip(campaigns, lines, strict=True)
@@ -138,7 +140,7 @@ def _chart(campaigns: Sequence[Campaign]) -> Plot:
     )
 
 
-def _before(campaign: Campaign, campaigns: Sequence[Campaign]) -> int:
+def _before(campaign: RebuiltResult, campaigns: Sequence[RebuiltResult]) -> int:
     """How many motions of other files on the page a file was made on top of."""
     earlier = {Path(prior).stem for prior in campaign.result.priors}
     return sum(
@@ -152,7 +154,7 @@ def _cut(name: str, longest: int = 22) -> str:
     return name if len(name) <= longest else f"{name[: longest - 1]}…"
 
 
-def _numbers(campaigns: Sequence[Campaign]) -> Table:
+def _numbers(campaigns: Sequence[RebuiltResult]) -> TableBlock:
     rows = []
     for campaign in campaigns:
         result = campaign.result
@@ -169,19 +171,19 @@ def _numbers(campaigns: Sequence[Campaign]) -> Table:
             )
         )
     columns = ("file", "motions", "stacked", "random", "on top of", "seed", "time [s]")
-    return Table(columns, tuple(rows), "Condition numbers", frozenset({1, 3, 5, 6}))
+    return TableBlock(columns, tuple(rows), "Condition numbers", frozenset({1, 3, 5, 6}))
 
 
-def _margins(campaigns: Sequence[Campaign]) -> Table:
+def _margins(campaigns: Sequence[RebuiltResult]) -> TableBlock:
     """The worst margin of every kind over all motions of each file."""
     kinds = dict.fromkeys(c.name for campaign in campaigns for c in campaign.problem.constraints)
     rows = tuple((kind, *(_worst(campaign, kind) for campaign in campaigns)) for kind in kinds)
     names = tuple(campaign.name for campaign in campaigns)
     right = frozenset(range(1, len(names) + 1))
-    return Table(("constraint", *names), rows, "Worst margins, at 1 kHz", right)
+    return TableBlock(("constraint", *names), rows, "Worst margins, at 1 kHz", right)
 
 
-def _worst(campaign: Campaign, kind: str) -> str:
+def _worst(campaign: RebuiltResult, kind: str) -> str:
     found = [m.margins[kind] for m in campaign.result.motions if kind in m.margins]
     if not found:
         return "–"
@@ -192,7 +194,7 @@ def _worst(campaign: Campaign, kind: str) -> str:
 # Several fits, or several diagnoses, side by side: errors, what was found, what differs.
 
 
-def compare_fits(fits: Mapping[str, StoredFit]) -> Section:
+def compare_fits(fits: Mapping[str, StoredFit]) -> PageSection:
     """Errors of several fits on held-out data, what the data fix, and the differing keys."""
     rows = tuple(
         (
@@ -204,7 +206,7 @@ def compare_fits(fits: Mapping[str, StoredFit]) -> Section:
         )
         for name, stored in fits.items()
     )
-    table = Table(
+    table = TableBlock(
         ("file", "held-out run", "training error", "held-out error", "identifiable"),
         rows,
         title="Mean relative error of the torque where joints move",
@@ -212,10 +214,10 @@ def compare_fits(fits: Mapping[str, StoredFit]) -> Section:
     )
     configs = [stored.config for stored in fits.values()]
     blocks: tuple[Block, ...] = (table, differences(list(fits), configs))
-    return Section("compare-fits", "Fits side by side", blocks)
+    return PageSection("compare-fits", "Fits side by side", blocks)
 
 
-def compare_diagnoses(diagnoses: Mapping[str, Diagnosis]) -> Section:
+def compare_diagnoses(diagnoses: Mapping[str, Diagnosis]) -> PageSection:
     """What several diagnoses found, their errors on held-out data and the differing keys."""
     rows = tuple(
         (
@@ -231,7 +233,7 @@ def compare_diagnoses(diagnoses: Mapping[str, Diagnosis]) -> Section:
         )
         for name, diagnosis in diagnoses.items()
     )
-    errors = Table(
+    errors = TableBlock(
         ("file", "held-out run", "error before", "error after", "found"),
         rows,
         title="Mean relative error of the torque where joints move, on held-out data",
@@ -240,7 +242,7 @@ def compare_diagnoses(diagnoses: Mapping[str, Diagnosis]) -> Section:
     blocks: list[Block] = [errors, *_by_joint(diagnoses)]
     names = list(diagnoses)
     blocks.append(differences(names, [diagnosis.config for diagnosis in diagnoses.values()]))
-    return Section("compare-diagnoses", "Diagnoses side by side", tuple(blocks))
+    return PageSection("compare-diagnoses", "Diagnoses side by side", tuple(blocks))
 
 
 def _by_joint(diagnoses: Mapping[str, Diagnosis]) -> list[Block]:
@@ -258,7 +260,7 @@ def _by_joint(diagnoses: Mapping[str, Diagnosis]) -> list[Block]:
     )
     right = frozenset(range(1, len(diagnoses) + 1))
     title = "The same joint by joint, before → after"
-    return [Table(("joint", *diagnoses), rows, title, right)]
+    return [TableBlock(("joint", *diagnoses), rows, title, right)]
 
 
 def _of(errors: Mapping[str, float], joint: str) -> str:

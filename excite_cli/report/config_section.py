@@ -1,15 +1,15 @@
 """Where a result comes from: config, seed, robot, versions, earlier data, times."""
 
 from excite_cli.excitation.result import Result
-from excite_cli.report.campaign import Campaign, counted, in_figures
-from excite_cli.report.page import Block, Fold, Section, Table, Text
+from excite_cli.report.campaign import RebuiltResult, counted, in_figures
+from excite_cli.report.page import Block, Fold, PageSection, TableBlock, Text
 
 
-def config_section(campaign: Campaign) -> Section:
+def config_section(campaign: RebuiltResult) -> PageSection:
     """What one needs to make the result again, and what was watched."""
     result, problem = campaign.result, campaign.problem
     blocks: list[Block] = [
-        Table(("what", "value"), _rows(campaign), title="This result"),
+        TableBlock(("what", "value"), _rows(campaign), title="This result"),
         Fold("The config, with all defaults (YAML)", (Text(result.config, "code"),)),
         _versions(result),
     ]
@@ -18,7 +18,7 @@ def config_section(campaign: Campaign) -> Section:
     left_out = problem.extension.left_out
     if left_out:
         blocks.append(Text("Effects that the regressor leaves out: " + "; ".join(left_out) + "."))
-    return Section(
+    return PageSection(
         campaign.anchor("config"),
         campaign.titled("How it was made"),
         tuple(blocks),
@@ -28,7 +28,7 @@ def config_section(campaign: Campaign) -> Section:
     )
 
 
-def _rows(campaign: Campaign) -> tuple[tuple[str, ...], ...]:
+def _rows(campaign: RebuiltResult) -> tuple[tuple[str, ...], ...]:
     result, problem = campaign.result, campaign.problem
     robot, trajectory = problem.robot, problem.trajectory
     earlier = ", ".join(result.priors) or "none"
@@ -50,19 +50,19 @@ def _rows(campaign: Campaign) -> tuple[tuple[str, ...], ...]:
     )
 
 
-def _versions(result: Result) -> Table:
+def _versions(result: Result) -> TableBlock:
     rows = tuple(sorted(result.versions.items()))
-    return Table(("library", "version"), rows, title="Versions", folded=True)
+    return TableBlock(("library", "version"), rows, title="Versions", folded=True)
 
 
 def _pairs(result: Result) -> Block:
     """Pairs that are kept apart, and those that are not, with the reasons."""
     blocks: list[Block] = [
-        Table(("checked",), tuple((pair,) for pair in result.checked_pairs)),
+        TableBlock(("checked",), tuple((pair,) for pair in result.checked_pairs)),
     ]
     if result.dropped_pairs:
         dropped = tuple((pair,) for pair in result.dropped_pairs)
-        blocks.append(Table(("not checked, and why",), dropped))
+        blocks.append(TableBlock(("not checked, and why",), dropped))
     return Fold(
         f"{counted(len(result.checked_pairs), 'pair')} checked, "
         f"{len(result.dropped_pairs)} not checked",

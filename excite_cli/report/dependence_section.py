@@ -6,12 +6,12 @@ from html import escape
 import numpy as np
 
 from excite_cli.diagnosis.covariate import Aspect, Covariate
-from excite_cli.diagnosis.records import Diagnosis, LargeRest
+from excite_cli.diagnosis.records import Diagnosis, ExcessResidual
 from excite_cli.diagnosis.traces import Dependence, Traces
 from excite_cli.diagnosis.words import covariate_in_words, rests_in_words
 from excite_cli.report.chart import Chart, Colour, limits_about
-from excite_cli.report.page import Block, Charts, Section, Text
-from excite_cli.report.plot import Panel, Plot, Series, merged
+from excite_cli.report.page import Block, Charts, PageSection, Text
+from excite_cli.report.plot import Curve, Panel, Plot, merged
 from excite_cli.report.residual_section import readable_unit
 from excite_cli.robot.model import Array
 
@@ -79,7 +79,7 @@ _UNITS = {"position": "rad", "speed": "rad/s", "acceleration": "rad/s²", "load"
 _SERIES = {"position": "q", "speed": "v", "acceleration": "a", "load": "load", "time": "t"}
 
 
-def dependence_section(found: Diagnosis) -> Section:
+def dependence_section(found: Diagnosis) -> PageSection:
     """Sentences, the map, and what is left over what it depends on most."""
     more, perhaps = rests_in_words(found, covariate_in_words)
     sentences: list[Block] = [Text(text, "bad") for text in more]
@@ -112,7 +112,7 @@ def dependence_section(found: Diagnosis) -> Section:
         "Every joint's residual is tried against time, angles, speeds and accelerations of all "
         "joints, and its own load, direction and history."
     )
-    return Section("diagnosis-unexplained", "Unexplained residual", tuple(blocks), lead)
+    return PageSection("diagnosis-unexplained", "Unexplained residual", tuple(blocks), lead)
 
 
 def _map(dependence: Dependence) -> Block:
@@ -141,7 +141,9 @@ def _map(dependence: Dependence) -> Block:
     )
 
 
-def _picture(found: Diagnosis, traces: Traces, rest: LargeRest, covariate: Covariate) -> list[Plot]:
+def _picture(
+    found: Diagnosis, traces: Traces, rest: ExcessResidual, covariate: Covariate
+) -> list[Plot]:
     """What is left of the joint over the covariate; nothing if too few samples are known."""
     if covariate.quantity not in _SERIES:
         return []  # of columns of the log no trace is kept
@@ -183,9 +185,9 @@ def _picture(found: Diagnosis, traces: Traces, rest: LargeRest, covariate: Covar
     panel = Panel(
         f"residual [{scaled}]",
         (
-            Series("residual", factor * samples, "muted", "dots"),
+            Curve("residual", factor * samples, "muted", "dots"),
             *(
-                Series(f"mean {label}".strip(), factor * own, colour, "joined")
+                Curve(f"mean {label}".strip(), factor * own, colour, "joined")
                 for colour, (label, _, _), own in zip(colours, means, middles, strict=False)
             ),
         ),

@@ -14,7 +14,7 @@ from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.report.chart import Colour
 from excite_cli.report.diagnosis_sections import torque_units
 from excite_cli.report.effect_section import effect_plots, friction_plots
-from excite_cli.report.plot import Look, Panel, Plot, Series
+from excite_cli.report.plot import Curve, Look, Panel, Plot
 from excite_cli.report.residual_error_section import by_joint
 from excite_cli.report.residual_section import plots_in_time
 from excite_cli.report.style import (
@@ -136,7 +136,7 @@ def _forbidden(
         yield high, shown[1]
 
 
-def _draw_series(axes: "Axes", x: Array, series: Series) -> None:
+def _draw_series(axes: "Axes", x: Array, series: Curve) -> None:
     there = ~np.isinf(series.y)
     colour = _COLOURS[series.colour]
     axes.plot(x[there], series.y[there], color=colour, label=series.label, **_LOOKS[series.look])

@@ -21,7 +21,7 @@ from excite_cli.diagnosis.words import (
     value_in_words,
     weighed_in_words,
 )
-from excite_cli.report.page import Block, Section, Table, Text
+from excite_cli.report.page import Block, PageSection, TableBlock, Text
 
 _COLUMNS = (
     "effect",
@@ -34,7 +34,7 @@ _COLUMNS = (
 )
 
 
-def found_section(found: Diagnosis) -> Section:
+def found_section(found: Diagnosis) -> PageSection:
     """Tables of what was found, absorbed and approximated, and the sentences about them."""
     large, small = by_worth(found.named, found)
     if len(small) < 2 or not large:
@@ -42,7 +42,7 @@ def found_section(found: Diagnosis) -> Section:
     blocks: list[Block] = []
     if large:
         blocks.append(
-            Table(
+            TableBlock(
                 (*_COLUMNS, "indistinguishable from"),
                 tuple(_row(found, each) for each in large),
                 title="What the declared model lacks",
@@ -58,7 +58,7 @@ def found_section(found: Diagnosis) -> Section:
         )
     if small:
         blocks.append(
-            Table(
+            TableBlock(
                 (*_COLUMNS, "indistinguishable from"),
                 tuple(_row(found, each) for each in small),
                 title=(
@@ -71,7 +71,7 @@ def found_section(found: Diagnosis) -> Section:
         )
     if found.approximations:
         blocks.append(
-            Table(
+            TableBlock(
                 (*_COLUMNS, "true form"),
                 tuple(_row(found, each) for each in found.approximations),
                 title="Surrogate terms (they approximate an effect that has no name)",
@@ -81,7 +81,7 @@ def found_section(found: Diagnosis) -> Section:
     blocks += [Text(text) for text in (*weighed_in_words(found), *changes_in_words(found))]
     if found.absorbed:
         blocks.append(_absorbed(found))
-    return Section("diagnosis-found", "What was found", tuple(blocks), _lead(found))
+    return PageSection("diagnosis-found", "What was found", tuple(blocks), _lead(found))
 
 
 def verdict(found: Diagnosis) -> str:
@@ -139,12 +139,12 @@ def _points(share: float) -> str:
     return "–" if isnan(share) else f"{100 * share:.2f} pp"
 
 
-def _absorbed(found: Diagnosis) -> Table:
+def _absorbed(found: Diagnosis) -> TableBlock:
     rows = [
         (title_of(each.kind), _where(each.joints, found.joint_names), ", ".join(each.by))
         for each in found.absorbed
     ]
-    return Table(
+    return TableBlock(
         ("effect", "where", "confounded with"),
         tuple(rows),
         title=f"Not identifiable: {len(rows)} candidates confounded with parameters",

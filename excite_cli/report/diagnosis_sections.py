@@ -19,7 +19,7 @@ from excite_cli.diagnosis.words import (
 from excite_cli.report.dependence_section import dependence_section
 from excite_cli.report.diagnosis_found_section import found_section
 from excite_cli.report.effect_section import effect_section
-from excite_cli.report.page import Block, Charts, Fold, KeyFigure, Section, Table, Text
+from excite_cli.report.page import Block, Charts, Fold, KeyFigure, PageSection, TableBlock, Text
 from excite_cli.report.residual_error_section import by_joint, error_blocks
 from excite_cli.report.residual_findings import findings_blocks, processing_table
 from excite_cli.report.residual_section import residuals_in_time
@@ -30,7 +30,7 @@ from excite_cli.report.robot_chart import robot_chart
 _OPEN_ROUNDS = 3
 
 
-def suspect_section(found: Diagnosis) -> Section:
+def suspect_section(found: Diagnosis) -> PageSection:
     """A table for every round; all but a few are folded."""
     tables = [_round(found, each) for each in found.rounds]
     first, later = tables[:_OPEN_ROUNDS], tables[_OPEN_ROUNDS:]
@@ -46,10 +46,10 @@ def suspect_section(found: Diagnosis) -> Section:
         "is by how much the error on runs left out falls. One that is refused now may be accepted "
         "in a later round."
     )
-    return Section("diagnosis-candidates", "Rejected candidates, with reasons", blocks, lead)
+    return PageSection("diagnosis-candidates", "Rejected candidates, with reasons", blocks, lead)
 
 
-def _round(found: Diagnosis, each: Round) -> Table:
+def _round(found: Diagnosis, each: Round) -> TableBlock:
     joints = len(found.joint_names)
     worst = max(each.residual, key=lambda joint: each.residual[joint])
     rows = tuple(
@@ -64,7 +64,7 @@ def _round(found: Diagnosis, each: Round) -> Table:
         for suspect in each.suspects
     )
     taken = {k for k, suspect in enumerate(each.suspects) if suspect.verdict is Verdict.ACCEPTED}
-    return Table(
+    return TableBlock(
         ("candidate", "where", "p", "share", "gain", "verdict"),
         rows,
         title=f"Round {each.index}: RMS residual up to {each.residual[worst]:.3g} ({worst})",
@@ -117,7 +117,7 @@ def _none(diagnosis: Diagnosis) -> str:
     return "nothing is missing" if diagnosis.complete else "unexplained residual"
 
 
-def diagnosis_sections(diagnosis: Diagnosis) -> tuple[Section, ...]:
+def diagnosis_sections(diagnosis: Diagnosis) -> tuple[PageSection, ...]:
     """Found, errors, residual in time, evidence, rest, suspects, data, and what to do next."""
     evidence = effect_section(diagnosis)
     return (
@@ -139,7 +139,7 @@ def torque_units(diagnosis: Diagnosis) -> tuple[str, ...]:
     return diagnosis.traces.torque_units
 
 
-def _errors(diagnosis: Diagnosis) -> Section:
+def _errors(diagnosis: Diagnosis) -> PageSection:
     low, high = diagnosis.after.interval
     blocks = error_blocks(
         ("before", "after"),
@@ -165,10 +165,10 @@ def _errors(diagnosis: Diagnosis) -> Section:
         f"found. Mean over all samples after: {diagnosis.after.mean_relative:.2%}, 95% interval "
         f"{low:.2%} to {high:.2%}. {untouched_in_words(diagnosis)}"
     )
-    return Section("diagnosis-errors", "Error before and after", blocks, lead)
+    return PageSection("diagnosis-errors", "Error before and after", blocks, lead)
 
 
-def _in_time(diagnosis: Diagnosis) -> Section:
+def _in_time(diagnosis: Diagnosis) -> PageSection:
     training = diagnosis.traces.runs if diagnosis.traces is not None else ()
     traces = (*diagnosis.held_out_traces, *training)
     lead = (
@@ -181,10 +181,10 @@ def _in_time(diagnosis: Diagnosis) -> Section:
         )
     )
     blocks = residuals_in_time(traces, diagnosis.joint_names, torque_units(diagnosis))
-    return Section("diagnosis-time", "Residual in time", blocks, lead)
+    return PageSection("diagnosis-time", "Residual in time", blocks, lead)
 
 
-def _next(diagnosis: Diagnosis) -> Section:
+def _next(diagnosis: Diagnosis) -> PageSection:
     experiment = next_experiment(diagnosis)
     pairs = experiment["pairs"]
     if not pairs:
@@ -192,14 +192,14 @@ def _next(diagnosis: Diagnosis) -> Section:
             "No effects are left to distinguish: the next motion excites the model with the "
             "effects that were found."
         )
-        return Section("diagnosis-next", "Next motion", (_command(experiment),), lead)
+        return PageSection("diagnosis-next", "Next motion", (_command(experiment),), lead)
     rows = tuple((_named(pair["effect"]), _named(pair["alias"])) for pair in pairs)
     lead = (
         f"{counted(len(rows), 'pair')} of effects fit these data as well as each other. The next "
         "motion is planned to distinguish them."
     )
-    table = Table(("found", "indistinguishable from"), rows)
-    return Section("diagnosis-next", "Next motion", (table, _command(experiment)), lead)
+    table = TableBlock(("found", "indistinguishable from"), rows)
+    return PageSection("diagnosis-next", "Next motion", (table, _command(experiment)), lead)
 
 
 def _command(experiment: dict[str, Any]) -> Text:
@@ -210,7 +210,7 @@ def _named(data: dict[str, Any]) -> str:
     return f"{title_of(data['kind'])} on {', '.join(data['joints'])}"
 
 
-def _runs(diagnosis: Diagnosis) -> list[Table]:
+def _runs(diagnosis: Diagnosis) -> list[TableBlock]:
     """Every run, what it was for, and what is there in it and not in all others."""
     names = [str(each) for each in diagnosis.processing.get("runs", ())]
     if len(names) < 2:
@@ -227,7 +227,7 @@ def _runs(diagnosis: Diagnosis) -> list[Table]:
         if any(each.runs for each in found)
         else ""
     )
-    return [Table(("run", "used as", "in it, not in all"), rows, title="Runs", note=note)]
+    return [TableBlock(("run", "used as", "in it, not in all"), rows, title="Runs", note=note)]
 
 
 def _within(name: str, runs: Sequence[str]) -> bool:
@@ -241,7 +241,7 @@ def _own(record: EffectRecord) -> str:
     return f"{title_of(record.kind)} of {', '.join(record.joints)}"
 
 
-def _data(diagnosis: Diagnosis) -> Section:
+def _data(diagnosis: Diagnosis) -> PageSection:
     blocks: list[Block] = [*findings_blocks(diagnosis.findings), *_runs(diagnosis)]
     blocks.append(processing_table(diagnosis.processing, diagnosis.joint_names))
     blocks.append(Fold("Configuration that was diagnosed", (Text(diagnosis.config, "code"),)))
@@ -251,4 +251,4 @@ def _data(diagnosis: Diagnosis) -> Section:
         "To go on with the extended model, `excite diagnose … --apply NEW.yaml` writes this "
         "configuration with the effects that were found."
     )
-    return Section("diagnosis-data", "Data and choices", tuple(blocks), lead)
+    return PageSection("diagnosis-data", "Data and choices", tuple(blocks), lead)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from excite_cli.diagnosis.traces import EffectTrace
 from excite_cli.report.chart import limits_about
-from excite_cli.report.plot import Panel, Plot, Series, merged
+from excite_cli.report.plot import Curve, Panel, Plot, merged
 from excite_cli.report.residual_section import readable_unit, torque_or_force
 from excite_cli.robot.model import Array
 
@@ -92,9 +92,9 @@ def cloud_plot(title: str, cloud: Cloud, caption: str = "") -> Plot:
     panel = Panel(
         f"{torque_or_force(unit)} [{unit}]",
         (
-            Series("left by all else", left, "muted", "dots"),
-            Series("median, 80 %", median, "blue", "marks", whiskers[0], whiskers[1]),
-            Series("as predicted" if cloud.diagonal else "fitted law", predicted, "vermilion"),
+            Curve("left by all else", left, "muted", "dots"),
+            Curve("median, 80 %", median, "blue", "marks", whiskers[0], whiskers[1]),
+            Curve("as predicted" if cloud.diagonal else "fitted law", predicted, "vermilion"),
         ),
         span=limits_about(np.concatenate([*outer, low, high])),
         height=210,
@@ -181,8 +181,8 @@ def window_plot(
     panel = Panel(
         f"{torque_or_force(unit)} [{scaled}]",
         (
-            Series("left by all else", factor * left, "muted", "joined"),
-            Series("the effect", factor * own, "vermilion"),
+            Curve("left by all else", factor * left, "muted", "joined"),
+            Curve("the effect", factor * own, "vermilion"),
         ),
         height=210,
     )

@@ -21,11 +21,11 @@ from excite_cli.diagnosis.words import (
 from excite_cli.effects.base import Effect, Picture
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.report.effect_chart import Cloud, cloud_of, cloud_plot, together, window_plot
-from excite_cli.report.page import Block, Charts, Fold, Section, Text
+from excite_cli.report.page import Block, Charts, Fold, PageSection, Text
 from excite_cli.report.plot import Plot
 
 
-def effect_section(found: Diagnosis) -> Section | None:
+def effect_section(found: Diagnosis) -> PageSection | None:
     """The section, or None if nothing was found."""
     if not found.effects:
         return None
@@ -34,7 +34,7 @@ def effect_section(found: Diagnosis) -> Section | None:
             "The file holds no samples to draw: it was written by an earlier version. Run "
             "`excite diagnose` again to have the pictures."
         )
-        return Section("diagnosis-evidence", "Evidence", (old,))
+        return PageSection("diagnosis-evidence", "Evidence", (old,))
     large, small = by_worth(found.effects, found)
     blocks: list[Block] = []
     whole = friction_plots(found, found.traces)
@@ -56,7 +56,7 @@ def effect_section(found: Diagnosis) -> Section | None:
         "medians lie about zero. Samples in which the joint stands or reverses are left "
         "out, as in the fit."
     )
-    return Section("diagnosis-evidence", "Evidence", tuple(blocks), lead)
+    return PageSection("diagnosis-evidence", "Evidence", tuple(blocks), lead)
 
 
 def effect_plots(

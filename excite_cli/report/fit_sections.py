@@ -13,7 +13,7 @@ from excite_cli.identification.fit_words import (
 )
 from excite_cli.identification.stored_model import StoredFit
 from excite_cli.report.chart import Chart, Colour
-from excite_cli.report.page import Block, Charts, Fold, KeyFigure, Section, Table, Text
+from excite_cli.report.page import Block, Charts, Fold, KeyFigure, PageSection, TableBlock, Text
 from excite_cli.report.residual_error_section import by_joint, error_blocks
 from excite_cli.report.residual_findings import findings_blocks, processing_table
 from excite_cli.report.residual_section import residuals_in_time
@@ -107,12 +107,12 @@ def fit_figures(stored: StoredFit) -> tuple[KeyFigure, ...]:
     )
 
 
-def fit_sections(stored: StoredFit) -> tuple[Section, ...]:
+def fit_sections(stored: StoredFit) -> tuple[PageSection, ...]:
     """Errors, parameters, residual in time, data and choices."""
     return (_errors(stored), parameter_section(stored.fit), time_section(stored), _data(stored))
 
 
-def _errors(stored: StoredFit) -> Section:
+def _errors(stored: StoredFit) -> PageSection:
     low, high = stored.error.interval
     blocks = error_blocks(
         ("training", "held-out"),
@@ -128,10 +128,10 @@ def _errors(stored: StoredFit) -> Section:
         f"{high:.2%}), {stored.error.mean_relative_moving:.2%} where joints move; on the training "
         f"data {stored.training_error.mean_relative:.2%}."
     )
-    return Section("fit-errors", "Error of the fit", blocks, lead)
+    return PageSection("fit-errors", "Error of the fit", blocks, lead)
 
 
-def parameter_section(fit: Fit) -> Section:
+def parameter_section(fit: Fit) -> PageSection:
     """Values with intervals, and how well the data fix each."""
     blocks: list[Block] = [Charts(parameter_charts(fit)), _table(fit), *correlated_parameters(fit)]
     if fit.consistent is not None:
@@ -144,10 +144,10 @@ def parameter_section(fit: Fit) -> Section:
         "identifiable. Standard deviations respect serial correlation: "
         f"the effective sample size is {fit.samples:.0f} of {fit.count}.{kept}"
     )
-    return Section("fit-parameters", "Parameters", tuple(blocks), lead)
+    return PageSection("fit-parameters", "Parameters", tuple(blocks), lead)
 
 
-def _table(fit: Fit) -> Table:
+def _table(fit: Fit) -> TableBlock:
     rows = tuple(
         (
             name,
@@ -160,7 +160,7 @@ def _table(fit: Fit) -> Table:
         )
         for i, name in enumerate(fit.names)
     )
-    return Table(
+    return TableBlock(
         ("parameter", "value", "std", "relative", "unit", "identifiable", "what it groups"),
         rows,
         title="Parameters in figures, and what each base parameter groups",
@@ -188,7 +188,7 @@ def correlated_parameters(fit: Fit) -> tuple[Block, ...]:
     )
     more = f"; the {_MOST_PAIRS} strongest are shown" if len(pairs) > _MOST_PAIRS else ""
     return (
-        Table(
+        TableBlock(
             ("parameter", "and", "correlation"),
             rows,
             title=f"{len(pairs)} pairs correlated by more than {_CORRELATED}{more}",
@@ -199,7 +199,7 @@ def correlated_parameters(fit: Fit) -> tuple[Block, ...]:
     )
 
 
-def time_section(stored: StoredFit) -> Section:
+def time_section(stored: StoredFit) -> PageSection:
     """Measured and predicted torque of all runs, the held-out ones first."""
     units = stored.torque_units or ("N·m",) * len(stored.fit.joint_names)
     # What took no part comes first: it is the judge.
@@ -211,10 +211,10 @@ def time_section(stored: StoredFit) -> Section:
         if traces
         else ""
     )
-    return Section("fit-time", "Fit in time", blocks, lead)
+    return PageSection("fit-time", "Fit in time", blocks, lead)
 
 
-def _data(stored: StoredFit) -> Section:
+def _data(stored: StoredFit) -> PageSection:
     blocks: list[Block] = []
     if stored.closed_loop_bias:
         text = stored.closed_loop_bias
@@ -228,4 +228,4 @@ def _data(stored: StoredFit) -> Section:
         blocks.append(Text(versions))
     sources = ", ".join(stored.sources)
     lead = f"From {sources}." if sources else ""
-    return Section("fit-data", "Data and choices", tuple(blocks), lead)
+    return PageSection("fit-data", "Data and choices", tuple(blocks), lead)

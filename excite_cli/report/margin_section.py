@@ -11,10 +11,18 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.geometry.reasons import reason_in_words
 from excite_cli.proof.certificate import Worst
-from excite_cli.report.campaign import Campaign, in_figures
+from excite_cli.report.campaign import RebuiltResult, in_figures
 from excite_cli.report.motion_section import drawn_motions, not_drawn
-from excite_cli.report.page import Block, Charts, Choice, KeyFigure, Section, Table, Text
-from excite_cli.report.plot import Panel, Plot, Series
+from excite_cli.report.page import (
+    Block,
+    Charts,
+    ChoiceBlock,
+    KeyFigure,
+    PageSection,
+    TableBlock,
+    Text,
+)
+from excite_cli.report.plot import Curve, Panel, Plot
 from excite_cli.robot.model import Array
 from excite_cli.summary.pairs import counted, doubts_in_words, unguarded_in_words, unjudged
 
@@ -37,20 +45,20 @@ class _Line:
     link: str
 
 
-def margin_section(campaign: Campaign) -> Section:
+def margin_section(campaign: RebuiltResult) -> PageSection:
     """A table of the worst margins, and every margin over time, the motion by choice."""
     problem, result = campaign.problem, campaign.result
     anchor, title = campaign.anchor("margins"), campaign.titled("Margins")
     if not problem.constraints:
         none = Text("The problem has no constraints, so there is nothing to keep away from.")
-        return Section(anchor, title, (none,))
+        return PageSection(anchor, title, (none,))
     options = []
     shown = drawn_motions(result.motions, len(problem.constraints))
     for motion in shown:
         charts = tuple(_chart(line) for line in _lines(problem, motion))
         blocks: tuple[Block, ...] = (Charts(charts),)
         options.append((f"motion {motion.index}", blocks))
-    return Section(
+    return PageSection(
         anchor,
         title,
         (
@@ -58,14 +66,14 @@ def margin_section(campaign: Campaign) -> Section:
             worst_table(result, problem.constraints),
             *_pairs(problem),
             *not_drawn(result.motions, shown),
-            Choice("Motion", tuple(options)),
+            ChoiceBlock("Motion", tuple(options)),
         ),
         "A margin is what is left beyond what the config asks to keep. Shaded: forbidden; the dot "
         "is the worst instant.",
     )
 
 
-def margin_figures(campaign: Campaign) -> tuple[KeyFigure, ...]:
+def margin_figures(campaign: RebuiltResult) -> tuple[KeyFigure, ...]:
     """Whether all constraints are proved."""
     if not campaign.problem.constraints:
         return ()
@@ -126,11 +134,11 @@ def _pairs(problem: Problem) -> list[Block]:
     if left:
         rows = [(f"{pair.first} – {pair.second}", reason_in_words(pair.reason)) for pair in left]
         title = "Link pairs that are not checked"
-        told.append(Table(("pair", "why"), tuple(rows), title=title, wordy=frozenset({0, 1})))
+        told.append(TableBlock(("pair", "why"), tuple(rows), title=title, wordy=frozenset({0, 1})))
     return told
 
 
-def worst_table(result: Result, constraints: tuple[Constraint, ...]) -> Table:
+def worst_table(result: Result, constraints: tuple[Constraint, ...]) -> TableBlock:
     """The worst margin of every constraint over all motions: how much, where, when, proved."""
     rows = []
     for name in dict.fromkeys(constraint.name for constraint in constraints):
@@ -152,7 +160,7 @@ def worst_table(result: Result, constraints: tuple[Constraint, ...]) -> Table:
                 "BROKEN" if worst.violations else proved,
             )
         )
-    return Table(
+    return TableBlock(
         ("constraint", "worst margin", "share", "where", "motion", "time [s]", "verdict"),
         tuple(rows),
         title="Worst margins over all motions, at 1 kHz",
@@ -202,8 +210,8 @@ def _chart(line: _Line) -> Plot:
     panel = Panel(
         f"{what} [{line.unit}]",
         (
-            Series("smallest margin", line.values, "blue"),
-            Series("worst", dot, "vermilion", "marks"),
+            Curve("smallest margin", line.values, "blue"),
+            Curve("worst", dot, "vermilion", "marks"),
         ),
         span=(min(smallest, 0.0) - 0.15 * top, 1.08 * top),
         limits=(0.0, np.inf),

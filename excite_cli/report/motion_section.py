@@ -7,10 +7,10 @@ import numpy as np
 from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
-from excite_cli.report.campaign import Campaign, in_figures
+from excite_cli.report.campaign import RebuiltResult, in_figures
 from excite_cli.report.chart import Colour, limits_about
-from excite_cli.report.page import Block, Charts, Choice, Section, Table, Text
-from excite_cli.report.plot import Panel, Plot, Series
+from excite_cli.report.page import Block, Charts, ChoiceBlock, PageSection, TableBlock, Text
+from excite_cli.report.plot import Curve, Panel, Plot
 from excite_cli.robot.model import Array
 
 # Instants per card: many joints and motions must not make the page heavy.
@@ -34,7 +34,7 @@ class _Signals:
     units: tuple[tuple[str, ...], ...]
 
 
-def motion_section(campaign: Campaign) -> Section:
+def motion_section(campaign: RebuiltResult) -> PageSection:
     """One card per joint, the motion by choice, and a table of peaks behind a fold."""
     problem, motions = campaign.problem, campaign.result.motions
     options = []
@@ -47,10 +47,10 @@ def motion_section(campaign: Campaign) -> Section:
         blocks: tuple[Block, ...] = (Charts(cards), _peaks(problem, signals))
         options.append((f"motion {motion.index}", blocks))
     duration = in_figures(problem.trajectory.duration)
-    return Section(
+    return PageSection(
         campaign.anchor("motions"),
         campaign.titled("Motions"),
-        (*not_drawn(motions, shown), Choice("Motion", tuple(options))),
+        (*not_drawn(motions, shown), ChoiceBlock("Motion", tuple(options))),
         f"{campaign.motions} of {duration} s, {problem.robot.n} joints. Shaded: beyond a limit. "
         "Speed, acceleration and (where the torque is bounded) the torque of the URDF's inertias "
         "are drawn as shares of their limits; dotted: there is no limit, share of the own peak.",
@@ -131,14 +131,14 @@ def _position(signals: _Signals, joint: int) -> Panel:
     finite = [limit for limit in limits if np.isfinite(limit)]
     span = limits_about([values.min(), values.max(), *finite])
     of_q = f"q [{signals.units[joint][0]}]"
-    return Panel(of_q, (Series("position", values, "blue"),), span=span, limits=limits)
+    return Panel(of_q, (Curve("position", values, "blue"),), span=span, limits=limits)
 
 
-def _share(signals: _Signals, order: int, joint: int) -> Series:
+def _share(signals: _Signals, order: int, joint: int) -> Curve:
     values, limit = signals.values[order, :, joint], signals.upper[order, joint]
     bounded = bool(np.isfinite(limit))
     size = limit if bounded else float(np.abs(values).max()) or 1.0
-    return Series(_WORDS[order], values / size, _COLOURS[order], "line" if bounded else "dotted")
+    return Curve(_WORDS[order], values / size, _COLOURS[order], "line" if bounded else "dotted")
 
 
 def _peak_words(signals: _Signals, order: int, joint: int) -> str:
@@ -162,7 +162,7 @@ def _bound(limit: float) -> str:
     return in_figures(float(limit)) if np.isfinite(limit) else "none"
 
 
-def _peaks(problem: Problem, signals: _Signals) -> Table:
+def _peaks(problem: Problem, signals: _Signals) -> TableBlock:
     """What every joint does at most, with the share of its limit."""
     rows = []
     for joint, name in enumerate(problem.robot.joint_names):
@@ -176,7 +176,7 @@ def _peaks(problem: Problem, signals: _Signals) -> Table:
                 *(_peak(signals, order, joint) for order in (1, 2, 3)),
             )
         )
-    return Table(
+    return TableBlock(
         ("joint", "position", "limits", "peak speed", "peak acceleration", "peak torque"),
         tuple(rows),
         title="Ranges and peaks of every joint",

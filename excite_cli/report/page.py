@@ -20,7 +20,7 @@ _SCRIPTS = ("early.js", "page.js", "uplot/uPlot.iife.min.js", "plot.js")
 
 
 @dataclass(frozen=True)
-class Table:
+class TableBlock:
     """Rows of texts under `columns`; columns numbered in `right` are aligned as numbers.
 
     `folded`: shown only when opened. `strong`: numbers of rows to stress. Columns numbered in
@@ -62,18 +62,18 @@ class Fold:
 
 
 @dataclass(frozen=True)
-class Choice:
+class ChoiceBlock:
     """Alternatives of which one is shown: a motion, a joint. On paper all are printed."""
 
     label: str
     options: tuple[tuple[str, tuple["Block", ...]], ...]
 
 
-Block = Chart | Plot | Charts | Table | Text | Fold | Choice
+Block = Chart | Plot | Charts | TableBlock | Text | Fold | ChoiceBlock
 
 
 @dataclass(frozen=True)
-class Section:
+class PageSection:
     """A part of the page with an entry in its table of contents; `lead` is its finding."""
 
     anchor: str
@@ -98,7 +98,7 @@ class Page:
     title: str
     subtitle: str
     figures: tuple[KeyFigure, ...]
-    sections: tuple[Section, ...]
+    sections: tuple[PageSection, ...]
     answers: tuple[Text, ...] = ()
 
 

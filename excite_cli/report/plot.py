@@ -22,7 +22,7 @@ _LEGEND, _AXIS = 30, 34  # px
 
 
 @dataclass(frozen=True)
-class Series:
+class Curve:
     """One quantity over the chart's x: `y` (T,), NaN where a line is to be broken.
 
     Infinite where it has no point of its own: a line goes on there. `low`, `high` (T,): ends of a
@@ -46,7 +46,7 @@ class Panel:
     """
 
     axis: str
-    series: tuple[Series, ...]
+    series: tuple[Curve, ...]
     span: tuple[float, float] | None = None
     limits: tuple[float, float] = (-np.inf, np.inf)
     height: int = 150
@@ -132,7 +132,7 @@ def _panel(panel: Panel) -> dict[str, Any]:
     }
 
 
-def _series(series: Series, logarithmic: bool) -> dict[str, Any]:
+def _series(series: Curve, logarithmic: bool) -> dict[str, Any]:
     told: dict[str, Any] = {
         "label": series.label,
         "colour": series.colour,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit_words import above_the_floor
 from excite_cli.report.chart import Chart
-from excite_cli.report.page import Block, Charts, Table, Text
+from excite_cli.report.page import Block, Charts, TableBlock, Text
 from excite_cli.report.rows_chart import Axis, Bar, Mark, Row, rows_chart
 
 # Errors per joint as dumbbells: two errors of each joint on one line, and what noise leaves.
@@ -133,7 +133,7 @@ def _table(
     units: Mapping[str, str],
     floor: Mapping[str, float] | None,
     note: str,
-) -> Table:
+) -> TableBlock:
     one, two = words
     columns = (
         "joint", f"moving, {one}", f"moving, {two}", f"all, {one}", f"all, {two}",
@@ -156,7 +156,7 @@ def _table(
     means = [_share(x) for x in (first.mean_relative_moving, second.mean_relative_moving,
                                  first.mean_relative, second.mean_relative)]  # fmt: skip
     rows.append(("mean", *means, *[""] * (len(columns) - 5)))
-    return Table(
+    return TableBlock(
         columns,
         tuple(rows),
         title="Errors in figures",

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from excite_cli.measurement.dataset import Finding
-from excite_cli.report.page import Block, Table, Text
+from excite_cli.report.page import Block, TableBlock, Text
 
 _WORDS = {
     "recorded_rate": "recorded rate [Hz]",
@@ -43,13 +43,13 @@ def findings_blocks(findings: Sequence[Finding]) -> tuple[Block, ...]:
     )
 
 
-def processing_table(processing: Mapping[str, Any], joint_names: Sequence[str]) -> Table:
+def processing_table(processing: Mapping[str, Any], joint_names: Sequence[str]) -> TableBlock:
     """Every choice by its name in words."""
     rows = tuple(
         (_WORDS.get(name, name.replace("_", " ")), _value(name, value, joint_names))
         for name, value in processing.items()
     )
-    return Table(("choice", "value"), rows, title="Processing of the data", folded=True)
+    return TableBlock(("choice", "value"), rows, title="Processing of the data", folded=True)
 
 
 def _value(name: str, value: Any, joint_names: Sequence[str]) -> str:

@@ -8,8 +8,8 @@ import numpy as np
 
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.report.chart import thinned
-from excite_cli.report.page import Block, Charts, Choice, Text
-from excite_cli.report.plot import Panel, Plot, Series
+from excite_cli.report.page import Block, Charts, ChoiceBlock, Text
+from excite_cli.report.plot import Curve, Panel, Plot
 from excite_cli.robot.model import Array
 
 # Units in which small and large torques read well.
@@ -50,7 +50,7 @@ def residuals_in_time(
         (label, (Charts(charts),))
         for label, charts in plots_in_time(traces, joint_names, units).items()
     )
-    return options[0][1] if len(options) == 1 else (Choice("Run", options),)
+    return options[0][1] if len(options) == 1 else (ChoiceBlock("Run", options),)
 
 
 def plots_in_time(
@@ -90,16 +90,16 @@ def _card(parts: Sequence[TorqueTrace], j: int, name: str, unit: str, points: in
     measured = _joined([part.measured[at, j] for part in parts])
     predicted = _joined([part.predicted[at, j] for part in parts])
     factor, of_torque = readable_unit(unit, _largest(measured))
-    rest = [Series("left", measured - predicted, "vermilion")]
+    rest = [Curve("left", measured - predicted, "vermilion")]
     if before:
         alone = _joined([part.before[at, j] for part in parts if part.before is not None])
-        rest.insert(0, Series("left before", measured - alone, "muted", "dashed"))
+        rest.insert(0, Curve("left before", measured - alone, "muted", "dashed"))
     small, of_left = readable_unit(unit, max(_largest(each.y) for each in rest))
     upper = Panel(
         f"{torque_or_force(unit)} [{of_torque}]",
         (
-            Series("measured", factor * measured, "muted"),
-            Series("model", factor * predicted, "blue"),
+            Curve("measured", factor * measured, "muted"),
+            Curve("model", factor * predicted, "blue"),
         ),
     )
     lower = Panel(f"left [{of_left}]", tuple(replace(each, y=small * each.y) for each in rest))

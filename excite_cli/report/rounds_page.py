@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from excite_cli.campaign.records import Campaign, Round
-from excite_cli.report.page import Charts, KeyFigure, Page, Section, Table, Text
-from excite_cli.report.plot import Panel, Plot, Series
+from excite_cli.campaign.records import Campaign, CampaignRound
+from excite_cli.report.page import Charts, KeyFigure, Page, PageSection, TableBlock, Text
+from excite_cli.report.plot import Curve, Panel, Plot
 from excite_cli.report.score_sections import table_of
 from excite_cli.summary.campaign import rounds_table
 
@@ -16,9 +16,9 @@ def rounds_page(campaign: Campaign, robot: str) -> Page:
         campaign.reason or f"Round {campaign.rounds[-1].number if campaign.rounds else 1} goes on."
     )
     kind = {"complete": "good", "": "plain"}.get(campaign.ended, "bad")
-    sections = [Section("rounds", "Rounds", (table_of(rounds_table(campaign)),))]
+    sections = [PageSection("rounds", "Rounds", (table_of(rounds_table(campaign)),))]
     if done:
-        sections.insert(0, Section("errors", "Error and precision", (Charts((_plot(done),)),)))
+        sections.insert(0, PageSection("errors", "Error and precision", (Charts((_plot(done),)),)))
         sections.append(_open(done[-1]))
     sections.append(_motions(campaign))
     return Page(
@@ -34,7 +34,7 @@ def rounds_page(campaign: Campaign, robot: str) -> Page:
     )
 
 
-def _figures(last: Round) -> tuple[KeyFigure, ...]:
+def _figures(last: CampaignRound) -> tuple[KeyFigure, ...]:
     learned = last.learned
     assert learned is not None
     return (
@@ -47,7 +47,7 @@ def _figures(last: Round) -> tuple[KeyFigure, ...]:
     )
 
 
-def _plot(done: list[Round]) -> Plot:
+def _plot(done: list[CampaignRound]) -> Plot:
     """Errors before and after, and the precision of torques, over the motion seconds so far."""
     learned = [each.learned for each in done if each.learned is not None]
     numbers = np.array([float(each.number) for each in done])
@@ -60,15 +60,15 @@ def _plot(done: list[Round]) -> Plot:
     errors = Panel(
         "held-out error [%]",
         (
-            Series("declared model", before, "vermilion", "joined"),
-            Series("with all effects found", after, "blue", "joined"),
+            Curve("declared model", before, "vermilion", "joined"),
+            Curve("with all effects found", after, "blue", "joined"),
         ),
         height=200,
         logarithmic=bool((before > 0).all() and (after > 0).all()),
     )
     precision = Panel(
         "torque std [σ]",
-        (Series("torque deviation", known, "green", "joined"),),
+        (Curve("torque deviation", known, "green", "joined"),),
         height=150,
     )
     return Plot(
@@ -85,14 +85,14 @@ def _plot(done: list[Round]) -> Plot:
     )
 
 
-def _open(last: Round) -> Section:
+def _open(last: CampaignRound) -> PageSection:
     learned = last.learned
     assert learned is not None
     lines = tuple(Text(each) for each in learned.open) or (Text("Nothing.", "good"),)
-    return Section("open", "What is open", lines)
+    return PageSection("open", "What is open", lines)
 
 
-def _motions(campaign: Campaign) -> Section:
+def _motions(campaign: Campaign) -> PageSection:
     rows = tuple(
         (
             each.name,
@@ -106,5 +106,5 @@ def _motions(campaign: Campaign) -> Section:
         for each in one.motions
     )
     columns = ("motion", "for", "pace", "seconds", "log", "rejected recordings")
-    table = Table(columns, rows, right=frozenset({2, 3}), wordy=frozenset({5}))
-    return Section("motions", "Motions", (table,))
+    table = TableBlock(columns, rows, right=frozenset({2, 3}), wordy=frozenset({5}))
+    return PageSection("motions", "Motions", (table,))

@@ -3,8 +3,8 @@
 import numpy as np
 
 from excite_cli.report.chart import Colour
-from excite_cli.report.page import Charts, KeyFigure, Section, Table
-from excite_cli.report.plot import Panel, Plot, Series
+from excite_cli.report.page import Charts, KeyFigure, PageSection, TableBlock
+from excite_cli.report.plot import Curve, Panel, Plot
 from excite_cli.scoring.records import Score
 from excite_cli.shown.answer import Table as ShownTable
 from excite_cli.summary.score import joints_table, runs_table
@@ -25,21 +25,23 @@ def score_figures(score: Score) -> tuple[KeyFigure, ...]:
     )
 
 
-def score_sections(score: Score) -> tuple[Section, ...]:
+def score_sections(score: Score) -> tuple[PageSection, ...]:
     """Ratios over the runs, the runs with their reasons, and the joints."""
     sections = [
-        Section("runs", "Runs", (table_of(runs_table(score)),)),
-        Section("joints", "Joints", (table_of(joints_table(score)),)),
+        PageSection("runs", "Runs", (table_of(runs_table(score)),)),
+        PageSection("joints", "Joints", (table_of(joints_table(score)),)),
     ]
     if score.made is not None and len(score.runs) > 1:
-        sections.insert(0, Section("ratios", "Residual over the runs", (Charts((_plot(score),)),)))
+        sections.insert(
+            0, PageSection("ratios", "Residual over the runs", (Charts((_plot(score),)),))
+        )
     return tuple(sections)
 
 
 def _plot(score: Score) -> Plot:
     count = len(score.runs)
     series = tuple(
-        Series(
+        Curve(
             joint,
             np.array([run.ratio.get(joint, np.nan) for run in score.runs]),
             _COLOURS[k % len(_COLOURS)],
@@ -60,11 +62,11 @@ def _plot(score: Score) -> Plot:
     )
 
 
-def table_of(shown: ShownTable) -> Table:
+def table_of(shown: ShownTable) -> TableBlock:
     """A table of the terminal, on the page."""
     places = {name: k for k, name in enumerate(shown.columns)}
     told = {places[name] for name in (*shown.left, *shown.words)}
-    return Table(
+    return TableBlock(
         shown.columns,
         shown.rows,
         shown.title,

@@ -8,7 +8,7 @@ from excite_cli.excitation.result import Result
 from excite_cli.excitation.stack import Stack
 from excite_cli.report.campaign import in_figures
 from excite_cli.report.chart import Colour
-from excite_cli.report.plot import Panel, Plot, Series
+from excite_cli.report.plot import Curve, Panel, Plot
 from excite_cli.robot.model import Array
 
 _HEIGHT = 200  # px
@@ -28,7 +28,7 @@ def spectrum_chart(result: Result, problem: Problem) -> Plot:
     )
     count = len(spectra[0][2])
     series = tuple(
-        Series(word, np.where(sigma > 0, sigma, np.nan), colour, "joined")
+        Curve(word, np.where(sigma > 0, sigma, np.nan), colour, "joined")
         for word, colour, sigma in spectra
     )
     return Plot(

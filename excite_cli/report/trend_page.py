@@ -6,8 +6,8 @@ Friction comes first; a point has a whisker of two standard deviations to each s
 import numpy as np
 
 from excite_cli.report.chart import Colour, limits_about
-from excite_cli.report.page import Charts, KeyFigure, Page, Section
-from excite_cli.report.plot import Panel, Plot, Series
+from excite_cli.report.page import Charts, KeyFigure, Page, PageSection
+from excite_cli.report.plot import Curve, Panel, Plot
 from excite_cli.report.score_sections import table_of
 from excite_cli.robot.model import Array
 from excite_cli.scoring.changes import Change, Changes
@@ -21,7 +21,7 @@ def trend_page(changes: Changes, title: str) -> Page:
     """The page of `changes`: charts of what belongs to a joint, and the table of all."""
     friction, others = _by_quantity(changes)
     sections = [
-        Section(anchor, name, (Charts(tuple(_plot(changes, own) for own in quantities)),))
+        PageSection(anchor, name, (Charts(tuple(_plot(changes, own) for own in quantities)),))
         for anchor, name, quantities in (
             ("friction", "Friction of the joints", friction),
             ("others", "What else belongs to a joint", others),
@@ -37,7 +37,7 @@ def trend_page(changes: Changes, title: str) -> Page:
                 "parameters that changed", f"{len(changes.significant)} of {len(changes.changes)}"
             ),
         ),
-        (*sections, Section("changes", "Changes", (table_of(changes_table(changes)),))),
+        (*sections, PageSection("changes", "Changes", (table_of(changes_table(changes)),))),
     )
 
 
@@ -80,8 +80,8 @@ def _plot(changes: Changes, own: list[Change]) -> Plot:
     )
 
 
-def _series(change: Change, colour: Colour) -> Series:
-    return Series(change.joint, np.array(change.values), colour, "joined", *_ends(change))
+def _series(change: Change, colour: Colour) -> Curve:
+    return Curve(change.joint, np.array(change.values), colour, "joined", *_ends(change))
 
 
 def _ends(change: Change) -> tuple[Array, Array]:

@@ -13,8 +13,8 @@ import numpy as np
 from excite_cli.dynamics.regressor import standard_parameter_unit, standard_parameters
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
-from excite_cli.report.campaign import Campaign, in_figures
-from excite_cli.report.page import Block, Section, Table, Text
+from excite_cli.report.campaign import RebuiltResult, in_figures
+from excite_cli.report.page import Block, PageSection, TableBlock, Text
 from excite_cli.report.spectrum_chart import row_unit
 from excite_cli.robot.model import Array
 
@@ -33,7 +33,7 @@ class _Columns:
     expected: Array
 
 
-def weakest_section(campaign: Campaign) -> Section:
+def weakest_section(campaign: RebuiltResult) -> PageSection:
     """The weakest direction in words, its composition, and how well each parameter will show."""
     result, problem = campaign.result, campaign.problem
     columns = _columns(result, problem)
@@ -41,7 +41,7 @@ def weakest_section(campaign: Campaign) -> Section:
     anchor, title = campaign.anchor("weakest"), campaign.titled("What shows least")
     if sigma[-1] <= _SINGULAR * sigma[0]:
         words = "A combination of parameters does not show at all: the stack is singular."
-        return Section(anchor, title, (_direction_table(columns, turned[-1]),), words)
+        return PageSection(anchor, title, (_direction_table(columns, turned[-1]),), words)
     blocks: list[Block] = [
         _direction_table(columns, turned[-1]),
         _parameter_table(result, columns, row_unit(problem)),
@@ -49,7 +49,7 @@ def weakest_section(campaign: Campaign) -> Section:
     if len(result.effect_names):
         listed = ", ".join(result.effect_names)
         blocks.append(Text(f"Columns of effects stand beside the base parameters: {listed}."))
-    return Section(anchor, title, tuple(blocks), _words(columns, sigma, turned[-1]))
+    return PageSection(anchor, title, tuple(blocks), _words(columns, sigma, turned[-1]))
 
 
 def _words(columns: _Columns, sigma: Array, direction: Array) -> str:
@@ -80,7 +80,7 @@ def _columns(result: Result, problem: Problem) -> _Columns:
     )
 
 
-def _direction_table(columns: _Columns, direction: Array) -> Table:
+def _direction_table(columns: _Columns, direction: Array) -> TableBlock:
     """The largest parts of the direction: coefficient and share, what the parameter groups."""
     order = np.argsort(-np.abs(direction))[:_SHOWN]
     sign = 1.0 if direction[order[0]] > 0 else -1.0
@@ -96,7 +96,7 @@ def _direction_table(columns: _Columns, direction: Array) -> Table:
     left = 1.0 - float((direction[order] ** 2).sum())
     rest = len(direction) - len(order)
     note = f"The other {rest} make up {100 * left:.0f} %." if rest else ""
-    return Table(
+    return TableBlock(
         ("base parameter", "coefficient [–]", "share [–]", "represents"),
         rows,
         title="The weakest direction",
@@ -106,7 +106,7 @@ def _direction_table(columns: _Columns, direction: Array) -> Table:
     )
 
 
-def _parameter_table(result: Result, columns: _Columns, unit: str) -> Table:
+def _parameter_table(result: Result, columns: _Columns, unit: str) -> TableBlock:
     """Standard deviations for noise of one unit per row of the stack, the worst known first."""
     inverse = np.linalg.pinv(result.stack.factor)
     std = columns.scales * np.linalg.norm(inverse, axis=1)
@@ -125,7 +125,7 @@ def _parameter_table(result: Result, columns: _Columns, unit: str) -> Table:
     )
     plain = bool(np.all(result.row_weights == 1.0))
     noise = f"1 {unit}" if plain else "one weighted unit"
-    return Table(
+    return TableBlock(
         ("base parameter", "unit", "by the URDF", "std", "of the value"),
         rows,
         title=f"How well each base parameter would be known, for noise of {noise} per sample",

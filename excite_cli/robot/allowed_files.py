@@ -21,7 +21,7 @@ _MARKS = ("package.xml", "model.config")  # of ROS and of Gazebo
 
 
 @dataclass(frozen=True)
-class Needed:
+class FolderRequest:
     """What a description asks for, and the folder that would have to be allowed for it.
 
     near: the folder is a package that says so itself, or lies beside the description; a path that
@@ -40,7 +40,7 @@ class Needed:
 class OutsideError(RobotError):
     """A description names a file outside the folders that it may read."""
 
-    def __init__(self, source: str, needed: Needed, own: Path) -> None:
+    def __init__(self, source: str, needed: FolderRequest, own: Path) -> None:
         self.source, self.needed, self.own = source, needed, own
         super().__init__(
             f"{source} asks for {needed}, which is outside its own folder ({own}). If that is "
@@ -99,12 +99,12 @@ def allowed_files(path: Path, package_dirs: Iterable[str | Path] = ()) -> Allowe
     return AllowedFiles(path, tuple(dict.fromkeys(folders)))
 
 
-def outside(file: Path, path: Path) -> Needed:
+def outside(file: Path, path: Path) -> FolderRequest:
     """What would have to be allowed for a `file`, which the description at `path` names."""
     return needed(file.name, file.parent, path)
 
 
-def needed(name: str, folder: Path, path: Path) -> Needed:
+def needed(name: str, folder: Path, path: Path) -> FolderRequest:
     """A folder that the description at `path` asks for, by the name of what is in it."""
     real = folder.resolve()
     above = [each for each in path.resolve().parents[:_ABOVE] if not holds_everything(each)]
@@ -112,7 +112,7 @@ def needed(name: str, folder: Path, path: Path) -> Needed:
     marked = any(is_trusted(real / mark, path) for mark in _MARKS)
     hidden = any(part.startswith(".") for part in real.parts[1:] if part not in path.parts)
     near = (beside or marked) and not hidden and not holds_everything(real)
-    return Needed(name, folder, near and is_trusted(real, path))
+    return FolderRequest(name, folder, near and is_trusted(real, path))
 
 
 def holds_everything(folder: Path) -> bool:

@@ -18,7 +18,7 @@ _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Payload:
+class CarriedPayload:
     """What `link` carries.
 
     capsule: in the frame of the joint that carries the link, by the name `payload`.
@@ -35,7 +35,7 @@ class Payload:
         return f"{self.phi[0]:g} kg on {self.link}"
 
 
-def payload_on(model: pin.Model, spec: PayloadSpec) -> Payload:
+def payload_on(model: pin.Model, spec: PayloadSpec) -> CarriedPayload:
     """The payload of `spec` on `model`, whose inertias are left as they are.
 
     Raises
@@ -65,10 +65,12 @@ def payload_on(model: pin.Model, spec: PayloadSpec) -> Payload:
         by_hand=True,
     )
     check_size(model, capsule, "robot.payload")
-    return Payload(spec.link, capsule, np.array(placement.act(inertia).toDynamicParameters()))
+    return CarriedPayload(
+        spec.link, capsule, np.array(placement.act(inertia).toDynamicParameters())
+    )
 
 
-def add_payload(model: pin.Model, payload: Payload) -> None:
+def add_payload(model: pin.Model, payload: CarriedPayload) -> None:
     """Let the body that carries `payload` have its inertia too."""
     if payload.phi[0] > 0:
         joint = payload.capsule.joint

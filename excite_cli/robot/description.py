@@ -22,7 +22,7 @@ from excite_cli.errors import RobotError, nearest
 from excite_cli.given_files import require_stored
 from excite_cli.robot.allowed_files import own_folder
 from excite_cli.robot.descriptions_package import PREFIX, Found, find_description
-from excite_cli.robot.formats.base import Asked
+from excite_cli.robot.formats.base import ConversionRequest
 from excite_cli.robot.formats.catalogue import as_urdf
 from excite_cli.robot.formats.urdf_parts import add_shape, capsule, origin_of
 from excite_cli.robot.limits import UNBOUNDED, ordered_limits
@@ -176,7 +176,9 @@ def load_description(
             raise RobotError(f"robot.package_dirs: there is no folder {given} ({folder}).")
     file = _file(urdf, root)
     path, dirs = file.path, (*extra, *file.package_dirs)
-    found = as_urdf(path, _read(path), Asked(dirs, {**file.arguments, **(arguments or {})}))
+    found = as_urdf(
+        path, _read(path), ConversionRequest(dirs, {**file.arguments, **(arguments or {})})
+    )
     tree = parsed(path, found.text)
     strange, swapped = put_into_standard(tree), ordered_limits(path, tree)
     followers, loops = mimics(path, tree), closed_loops(tree)

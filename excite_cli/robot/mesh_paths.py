@@ -18,7 +18,7 @@ from urllib.parse import unquote
 from excite_cli.errors import RobotError
 from excite_cli.robot.description import EXAMPLE_PREFIX, RobotDescription
 from excite_cli.robot.mesh_trial import MAX_BYTES, copy_of, faults
-from excite_cli.robot.packages import package_in, variables_in_words
+from excite_cli.robot.ros_packages import package_in, variables_in_words
 
 Kind = Literal["collision", "visual"]
 

@@ -19,7 +19,7 @@ from excite_cli.errors import ConfigError, RobotError
 from excite_cli.measurement.motors import Motors, motors_of
 from excite_cli.robot.assumed_inertias import with_assumed_inertias
 from excite_cli.robot.base_joints import BASE_JOINTS, on_base_joints
-from excite_cli.robot.carried_payload import Payload, add_payload, payload_on
+from excite_cli.robot.carried_payload import CarriedPayload, add_payload, payload_on
 from excite_cli.robot.coupling import Coupling
 from excite_cli.robot.description import RobotDescription, load_description
 from excite_cli.robot.limits import UNBOUNDED, JointRange, Limits, check_range, limits_of
@@ -61,7 +61,7 @@ class Robot:
     limits: Limits
     base_orientation: tuple[float, float, float] = (0.0, 0.0, 0.0)
     locked: dict[str, float] = field(default_factory=dict)
-    payload: Payload | None = None
+    payload: CarriedPayload | None = None
     visual_shapes: bool = False
     base_joints: int = 0
     held: "Robot | None" = None

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from excite_cli.robot.allowed_files import (
-    Needed,
+    FolderRequest,
     OutsideError,
     holds_everything,
     is_trusted,
@@ -18,14 +18,14 @@ from excite_cli.robot.allowed_files import (
 )
 from excite_cli.robot.description import RobotDescription, load_description
 from excite_cli.robot.mesh_paths import Kind, MeshFiles, mesh_file, mesh_names, package_of
-from excite_cli.robot.packages import search_package
+from excite_cli.robot.ros_packages import search_package
 
 _ABOVE = 4  # folders above the URDF that relative paths may start from
 
-Allow = Callable[[Needed], bool]
+Allow = Callable[[FolderRequest], bool]
 
 
-def allow_nothing(needed: Needed) -> bool:
+def allow_nothing(needed: FolderRequest) -> bool:
     """The answer of one who was not asked."""
     return False
 
@@ -36,7 +36,7 @@ def load_with_folders(
     relative_to: Path,
     arguments: Mapping[str, object] | None = None,
     allow: Allow = allow_nothing,
-) -> tuple[RobotDescription, tuple[Needed, ...]]:
+) -> tuple[RobotDescription, tuple[FolderRequest, ...]]:
     """The description, as `load_description`, and what had to be allowed for it.
 
     allow: whether a folder outside the robot's own may be read; asked once for each.
@@ -48,7 +48,7 @@ def load_with_folders(
     RobotError, MissingExtraError, FileError
         As `load_description`.
     """
-    allowed: dict[Path, Needed] = {}
+    allowed: dict[Path, FolderRequest] = {}
     while True:
         dirs = (*package_dirs, *map(str, allowed))
         try:
@@ -66,13 +66,13 @@ def load_with_folders(
             allowed[each.folder] = each
 
 
-def needed_folders(description: RobotDescription) -> list[Needed]:
+def needed_folders(description: RobotDescription) -> list[FolderRequest]:
     """Folders beyond those of `description` that its meshes are in, and what they hold.
 
     What is found nowhere is left out: the check of the meshes says so.
     """
     files = MeshFiles(description)
-    found: dict[Path, Needed] = {}
+    found: dict[Path, FolderRequest] = {}
     kinds: tuple[Kind, ...] = ("collision", "visual")
     for name in dict.fromkeys(name for kind in kinds for _, name in mesh_names(description, kind)):
         package, inside = package_of(name)

@@ -20,7 +20,7 @@ from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.regression import seen_of, with_effects
 from excite_cli.robot.model import Array, Robot
-from excite_cli.scoring.records import Reason
+from excite_cli.scoring.records import RunExplanation
 
 _MOST = 3  # reasons
 _LEAST = 0.15  # of what is too much, that a reason must explain
@@ -34,7 +34,7 @@ def reasons_of(
     run: PreparedRun,
     allowed: Array,
     correlated: float,
-) -> tuple[Reason, ...]:
+) -> tuple[RunExplanation, ...]:
     """What explains the residual of `run` beside `model`, the strongest first.
 
     `allowed` RMS (n,); `correlated`: how many samples carry the information of one.
@@ -136,7 +136,7 @@ def _told(
     taken: list[tuple[Effect, Array]],
     first: float,
     correlated: float,
-) -> tuple[Reason, ...]:
+) -> tuple[RunExplanation, ...]:
     """The reasons fitted together; each with the share that goes if it alone is left out."""
     if not taken:
         return ()
@@ -157,5 +157,5 @@ def _told(
         spread = correlated * noise * covariance[part, part]
         told = effect.report_on(robot.sliding, values[part], spread)
         record = record_of(effect, robot.joint_names, values[part])
-        reasons.append(Reason(replace(record, runs=()), told, share))
+        reasons.append(RunExplanation(replace(record, runs=()), told, share))
     return tuple(sorted(reasons, key=lambda each: -each.share))

@@ -44,7 +44,7 @@ class Replay(Shown):
 
 
 @dataclass(frozen=True)
-class Reason:
+class RunExplanation:
     """What a run has that the model has not: an effect, its `parameters`, and what it explains.
 
     `share` of the residual's energy, joints weighed by what the model allows them.
@@ -77,7 +77,7 @@ class ScoredRun(Shown):
     ratio: dict[str, float] = field(default_factory=dict)
     peak: dict[str, float] = field(default_factory=dict)
     left: tuple[str, ...] = ()
-    reasons: tuple[Reason, ...] = ()
+    reasons: tuple[RunExplanation, ...] = ()
     covariates: dict[str, float] = field(default_factory=dict)
     epoch: float | None = None
 

@@ -18,7 +18,7 @@ from excite_cli.robot.model import Array
 from excite_cli.scoring.beyond_friction import beyond_friction
 from excite_cli.scoring.drift import Shift
 from excite_cli.scoring.fault_isolation import reasons_of
-from excite_cli.scoring.records import Reason, ScoredRun
+from excite_cli.scoring.records import RunExplanation, ScoredRun
 from excite_cli.scoring.thresholds import Residual
 from excite_cli.scoring.tolerance import Allowance, allowance_of, blocks_of, rms_of
 
@@ -145,7 +145,7 @@ class Scorer:
         if worse is not None:
             beyond |= np.isin(names, worse.joints)
         left = tuple(name for name, out in zip(names, beyond, strict=True) if out)
-        reasons: tuple[Reason, ...] = ()
+        reasons: tuple[RunExplanation, ...] = ()
         if left:
             longest = max(prepared, key=lambda run: len(run.t))
             finite = np.isfinite(allowed)

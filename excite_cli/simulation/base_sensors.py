@@ -11,8 +11,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from excite_cli.base_link.rows import frames_of, sign_of
 from excite_cli.base_link.state import reference_rotation, unit_on_base
+from excite_cli.base_link.wrench_rows import frames_of, sign_of
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.config.wrench_spec import ImuSpec
 from excite_cli.dynamics.contact_frames import contact_jacobians

@@ -10,12 +10,12 @@ import numpy as np
 from excite_cli.dynamics.pseudo_inertia import pseudo_inertias, ten_parameters
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.effects.base import Effect
-from excite_cli.effects.simulated_robot import Coupling, Hysteresis, Push, Transmission
+from excite_cli.effects.simulated_robot import DryCoupling, Hysteresis, Push, Transmission
 from excite_cli.errors import RobotError
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.covariate_series import CovariateSeries
-from excite_cli.simulation.ground_truth import Planted
+from excite_cli.simulation.ground_truth import PlantedEffect
 from excite_cli.simulation.mujoco_model import (
     Plant,
     build_plant,
@@ -98,12 +98,12 @@ class Build:
     gain: Array
     offset: Array
     soft: dict[int, Transmission] = field(default_factory=dict)
-    couplings: list[Coupling] = field(default_factory=list)
+    couplings: list[DryCoupling] = field(default_factory=list)
     pushes: list[Push] = field(default_factory=list)
-    looped: list[Planted] = field(default_factory=list)
+    looped: list[PlantedEffect] = field(default_factory=list)
     hystereses: list[tuple[int, Hysteresis]] = field(default_factory=list)
-    compensated: list[Planted] = field(default_factory=list)
-    recorded: list[Planted] = field(default_factory=list)
+    compensated: list[PlantedEffect] = field(default_factory=list)
+    recorded: list[PlantedEffect] = field(default_factory=list)
     start: float = 0.0
     series: tuple[CovariateSeries, ...] = ()
 
@@ -147,7 +147,7 @@ class Build:
 
     def apply(self, effect: Effect, values: Array) -> None:
         """Through the effect's own formula, at every step."""
-        self.looped.append(Planted(effect, values))
+        self.looped.append(PlantedEffect(effect, values))
 
     def remember(self, joint: int, hysteresis: Hysteresis) -> None:
         """On one joint, from step to step."""
@@ -155,18 +155,18 @@ class Build:
 
     def tell_controller(self, effect: Effect, values: Array) -> None:
         """For the controller to compensate."""
-        self.compensated.append(Planted(effect, values))
+        self.compensated.append(PlantedEffect(effect, values))
 
     def falsify(self, effect: Effect, values: Array) -> None:
         """By the effect's own formula, what is recorded."""
-        self.recorded.append(Planted(effect, values))
+        self.recorded.append(PlantedEffect(effect, values))
 
 
 def assemble(
     robot: Robot,
     phi: Array,
     run: RunId,
-    planted: Iterable[Planted],
+    planted: Iterable[PlantedEffect],
     start: float = 0.0,
     series: tuple[CovariateSeries, ...] = (),
 ) -> Build:

@@ -26,7 +26,7 @@ FORM = "kind@joint[,joint…]=value[,name:value…][;runs:name|name][;covariate:
 
 
 @dataclass(frozen=True)
-class Planted:
+class PlantedEffect:
     """An effect with its linear parameters; `extra` are settings of its mechanism only."""
 
     effect: Effect
@@ -68,7 +68,7 @@ def plant(
     others: Mapping[str, float] | None = None,
     runs: tuple[str, ...] = (),
     covariate: str = "",
-) -> Planted:
+) -> PlantedEffect:
     """One effect of `kind` on `joints`, with `value` and named `others`.
 
     `value` is that of the number the kind is known by, usually the first parameter.
@@ -79,12 +79,12 @@ def plant(
         value, others = first, {kind.known_by: value, **others}
     extra = {name: others.pop(name) for name in kind.settings if name in others}
     shape, values = kind.planted(value, others)
-    return Planted(kind(joints, shape, runs, covariate), values, extra)
+    return PlantedEffect(kind(joints, shape, runs, covariate), values, extra)
 
 
 def parse_planted(
     text: str, robot: Robot, takes: Mapping[str, Sequence[str]]
-) -> tuple[Planted, ...]:
+) -> tuple[PlantedEffect, ...]:
     """The effects that `text` asks for; a kind local to a joint gives one for each joint named.
 
     `takes`: names of the runs of each motion; a motion's name stands for all its runs.
@@ -196,7 +196,7 @@ def sized(
     effects: Sequence[Effect],
     seed: int,
     covariates: Sequence[CovariateSeries] = (),
-) -> tuple[Planted, ...]:
+) -> tuple[PlantedEffect, ...]:
     """Each effect with values that give 3–10 % of the joint's torque RMS on brisk random states.
 
     They depend on the robot and the seed alone: the same robot plays every motion.
@@ -230,7 +230,7 @@ def sized(
             unit = _per_unit(effect, signals)
             size = share * load[list(effect.joints)].min() / np.maximum(unit, 1e-6)
             values = sign * np.minimum(size, [p.high for p in effect.parameters])
-        planted.append(Planted(effect, values, declared=True))
+        planted.append(PlantedEffect(effect, values, declared=True))
     return tuple(planted)
 
 

@@ -12,7 +12,7 @@ from excite_cli.errors import RobotError
 from excite_cli.robot.model import Array
 from excite_cli.simulation.build import Build
 from excite_cli.simulation.controller import Gains, Reference
-from excite_cli.simulation.ground_truth import Planted
+from excite_cli.simulation.ground_truth import PlantedEffect
 from excite_cli.simulation.mujoco_model import Plant, load_mujoco
 
 # Effects that MuJoCo has no part for: their own formula, evaluated at every control step.
@@ -65,7 +65,7 @@ class LoopedEffects:
         return Signals(times, q, v, a, load, load, body, build.run, build.start, covariates)
 
 
-def _total(planted: Sequence[Planted], signals: Signals) -> Array:
+def _total(planted: Sequence[PlantedEffect], signals: Signals) -> Array:
     """Sum of the effects' torques (T, n); the plain product is taken here, where time counts."""
     total = np.zeros_like(signals.q)
     for each in planted:
@@ -84,7 +84,7 @@ _PUSHING_WIDTH = 1e-2  # rad/s
 
 
 @dataclass(frozen=True)
-class Played:
+class MotorRecord:
     """What happened at the control instants `t` (N,): positions and torques of the motors (N, n).
 
     A torque stands from its instant to the next. `step` is the physics step [s].
@@ -97,7 +97,7 @@ class Played:
     step: float
 
 
-def play(build: Build, plant: Plant, reference: Reference, gains: Gains) -> Played:
+def play(build: Build, plant: Plant, reference: Reference, gains: Gains) -> MotorRecord:
     """Let the robot follow the reference, from rest relative to it.
 
     Raises
@@ -150,7 +150,7 @@ def play(build: Build, plant: Plant, reference: Reference, gains: Gains) -> Play
         applied[motor] = torque
         mujoco.mj_step(model, data, substeps)
     _check(build, reference, q)
-    return Played(reference.t, q, v, tau, float(model.opt.timestep))
+    return MotorRecord(reference.t, q, v, tau, float(model.opt.timestep))
 
 
 def _engage(build: Build, plant: Plant, data: Any, load: Array) -> None:

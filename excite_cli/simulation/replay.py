@@ -31,7 +31,7 @@ _LOST = 1.0  # rad: more is a model that fell over
 
 
 @dataclass(frozen=True)
-class Played:
+class ReplayInput:
     """A measured motion `q`, `v` at equidistant `t` (T,), and the `torque` to play, each (T, n)."""
 
     t: Array
@@ -64,7 +64,7 @@ def inertias(xml: str, q: Array) -> Array:
     return total / max(len(q), 1)
 
 
-def drift(xml: str, runs: Sequence[Played], inertia: Array) -> Drift:
+def drift(xml: str, runs: Sequence[ReplayInput], inertia: Array) -> Drift:
     """Deviation of the model `xml` (MJCF) from `runs`.
 
     `inertia` (n,) scales the loop that holds it.

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.config.spec import Spec
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.robot.model import Array

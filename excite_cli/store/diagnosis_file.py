@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from excite_cli.atomic import write_atomically
-from excite_cli.diagnosis.records import Absorbed, Diagnosis, EffectRecord
+from excite_cli.diagnosis.records import ConfoundedCandidate, Diagnosis, EffectRecord
 from excite_cli.diagnosis.traces import Traces
 from excite_cli.measurement.hdf5_writer import new_hdf5
 from excite_cli.store import checked
@@ -76,7 +76,7 @@ def _traced_joints(traces: Traces) -> set[str]:
 
 def _named_joints(found: Diagnosis) -> set[str]:
     """All that its records name."""
-    records: list[EffectRecord | Absorbed] = [
+    records: list[EffectRecord | ConfoundedCandidate] = [
         *found.declared,
         *found.information.model,
         *found.information.rivals,
@@ -92,7 +92,7 @@ def _named_joints(found: Diagnosis) -> set[str]:
         *(joint for each in records for joint in each.joints),
         *(joint for each in found.effects for joint in (*each.removes, *each.parts)),
         *found.inertia_parts,
-        *(each.joint for each in found.large_rests),
+        *(each.joint for each in found.excess_residuals),
         *(each.joint for each in found.friction_lines),
         *(joint for each in found.rounds for joint in each.residual),
     }

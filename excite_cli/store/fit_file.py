@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from excite_cli.atomic import write_atomically
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.uncertain_inertias import FitKnowledge
 from excite_cli.effects.base import Effect

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from excite_cli.config.load import load_spec, parse_spec
+from excite_cli.config.load_spec import load_spec, parse_spec
 from excite_cli.config.spec import IdentifiedSpec, Spec
 from excite_cli.diagnosis.candidates import effect_of
 from excite_cli.diagnosis.records import EffectRecord

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from excite_cli.config.load import load_spec, spec_as_yaml
+from excite_cli.config.load_spec import load_spec, spec_as_yaml
 from excite_cli.config.spec import Spec
 from excite_cli.errors import FileError, RobotError
 from excite_cli.workers.base import Tell

@@ -8,13 +8,13 @@ from pathlib import Path
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.given_files import require_stored
 from excite_cli.study.case import StudyCase, StudyTask, contents_of, request_of
-from excite_cli.study.vary import Varied, combinations
+from excite_cli.study.vary import VariedKey, combinations
 
 _LONGEST = 100  # bytes of a name: with digest, suffix and `.part` a file system still takes it
 
 
 def planned_cases(
-    task: StudyTask, logs: Sequence[Path], varied: Sequence[Varied]
+    task: StudyTask, logs: Sequence[Path], varied: Sequence[VariedKey]
 ) -> list[StudyCase]:
     """Every combination of values, for every log if there are any.
 

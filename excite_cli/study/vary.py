@@ -13,14 +13,14 @@ MOST = 100_000
 
 
 @dataclass(frozen=True)
-class Varied:
+class VariedKey:
     """A key of the config and its values, as YAML text."""
 
     key: str
     values: tuple[str, ...]
 
 
-def parse_vary(text: str) -> Varied:
+def parse_vary(text: str) -> VariedKey:
     """`key.path=V1,V2,…`; `1..8` stands for the whole numbers from 1 to 8.
 
     Commas within brackets, braces and quotes belong to the value.
@@ -43,10 +43,10 @@ def parse_vary(text: str) -> Varied:
     twice = next((value for value in values if values.count(value) > 1), None)
     if twice is not None:
         raise ConfigError(f"--vary {text}: {twice} is given twice.")
-    return Varied(key, tuple(values))
+    return VariedKey(key, tuple(values))
 
 
-def combinations(varied: Sequence[Varied]) -> list[dict[str, str]]:
+def combinations(varied: Sequence[VariedKey]) -> list[dict[str, str]]:
     """Every combination of values by key, the last key changing fastest; one, empty, of nothing.
 
     Raises

@@ -3,7 +3,7 @@
 from dataclasses import asdict
 from pathlib import Path
 
-from excite_cli.campaign.records import Campaign, Round, RoundFindings
+from excite_cli.campaign.records import Campaign, CampaignRound, RoundFindings
 from excite_cli.shown.answer import Answer, Part, Table
 from excite_cli.shown.record import show
 
@@ -42,7 +42,7 @@ def rounds_table(campaign: Campaign) -> Table:
     )
 
 
-def _row(each: Round) -> tuple[str, ...]:
+def _row(each: CampaignRound) -> tuple[str, ...]:
     learned = each.learned
     pace = f"{min(m.pace for m in each.motions):.0%}"
     seconds = f"{sum(m.seconds for m in each.motions if m.data):.0f}"

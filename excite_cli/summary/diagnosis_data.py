@@ -92,9 +92,9 @@ def diagnosis_data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, An
             }
             for each in found.unexplained
         ],
-        "large_rests": [
+        "excess_residuals": [
             {**asdict(each), "depends_on": [covariate.code for covariate in each.depends_on]}
-            for each in found.large_rests
+            for each in found.excess_residuals
         ],
         "error": {
             "held_out_run": found.held_out_run,

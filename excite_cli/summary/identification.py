@@ -15,7 +15,7 @@ from excite_cli.identification.fit_words import (
     with_deviation,
 )
 from excite_cli.identification.identify import Identification
-from excite_cli.identification.link_changes import Change, LinkChange
+from excite_cli.identification.link_changes import LinkChange, LinkParameterChange
 from excite_cli.identification.stored_model import StoredFit
 from excite_cli.shown.answer import Answer, Command, Parts, Table, as_word
 from excite_cli.shown.record import show
@@ -76,7 +76,7 @@ def link_data(links: Sequence[LinkChange]) -> list[dict[str, Any]]:
     ]
 
 
-def _link_changes_data(change: Change) -> dict[str, Any]:
+def _link_changes_data(change: LinkParameterChange) -> dict[str, Any]:
     return {
         "before": change.before,
         "after": change.after,

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
-from excite_cli.checks.result import Result
+from excite_cli.checks.check_result import CheckResult
 from excite_cli.checks.sentences import written
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.shown.answer import Answer, Command, Part, Parts, Table, as_word
@@ -51,11 +51,11 @@ show(Dataset, lambda data: f"{len(data.joint_names)} joints; {runs_in_words(data
 show(Run, _run_in_words, lambda run: [_run_table("Run", [run])])
 
 
-class Inspected(Protocol):
+class AnyInspection(Protocol):
     """An inspection."""
 
     @property
-    def results(self) -> tuple[Result, ...]:
+    def results(self) -> tuple[CheckResult, ...]:
         """Of every check."""
 
     @property
@@ -68,7 +68,7 @@ class Inspected(Protocol):
 
 
 def inspection_answer(
-    found: Inspected,
+    found: AnyInspection,
     config: str = "",
     data: tuple[str, ...] = (),
     applied: str | None = None,
@@ -79,12 +79,12 @@ def inspection_answer(
     return Answer((*parts,), {**_data(found, applied), "page": page}, found.good)
 
 
-def inspection_parts(found: Inspected) -> list[Part]:
+def inspection_parts(found: AnyInspection) -> list[Part]:
     """The headline, the rows, and the evidence of what is not fine."""
     return _parts(found, "", (), {})
 
 
-def checks_table(found: Inspected) -> Table:
+def checks_table(found: AnyInspection) -> Table:
     """A row for every check: its status, its joints, and what settles it."""
     rows = tuple(
         (each.name, each.status, ", ".join(each.joints), written(each.settings))
@@ -96,7 +96,7 @@ def checks_table(found: Inspected) -> Table:
     return Table("Set-up checks", columns, rows, columns, words, bold)
 
 
-def remarks(found: Inspected) -> list[str]:
+def remarks(found: AnyInspection) -> list[str]:
     """The evidence: of faults, then of doubts, then what was repaired."""
     texts = []
     for status, lead in (("fault", "fault: "), ("doubt", "doubt: "), ("ok", "")):
@@ -110,7 +110,7 @@ def remarks(found: Inspected) -> list[str]:
 
 
 def _parts(
-    found: Inspected, config: str, data: tuple[str, ...], written_to: Mapping[str, str | None]
+    found: AnyInspection, config: str, data: tuple[str, ...], written_to: Mapping[str, str | None]
 ) -> list[Part]:
     parts: list[Part] = [headline(found), checks_table(found), *remarks(found)]
     applied, page = written_to.get("apply"), written_to.get("page")
@@ -132,11 +132,11 @@ def _parts(
     return parts
 
 
-def _where(result: Result) -> str:
+def _where(result: CheckResult) -> str:
     return f"{result.runs}: " if result.runs else ""
 
 
-def headline(found: Inspected) -> str:
+def headline(found: AnyInspection) -> str:
     """One sentence."""
     faults, doubts, count = counted(found)
     if faults:
@@ -148,14 +148,14 @@ def headline(found: Inspected) -> str:
     return f"No faults and no doubts: {count} checks."
 
 
-def counted(found: Inspected) -> tuple[int, int, int]:
+def counted(found: AnyInspection) -> tuple[int, int, int]:
     """Checks with a fault, others with a doubt, all: the worse one counts where both were found."""
     faulty = {each.name for each in found.results if each.status == "fault"}
     doubted = {each.name for each in found.results if each.status == "doubt"} - faulty
     return len(faulty), len(doubted), len({each.name for each in found.results})
 
 
-def _data(found: Inspected, applied: str | None) -> dict[str, Any]:
+def _data(found: AnyInspection, applied: str | None) -> dict[str, Any]:
     """The answer for `--json`."""
     return {
         "good": found.good,

@@ -2,8 +2,8 @@
 
 from typing import Any
 
+from excite_cli.identification.carried_load import LoadIdentification
 from excite_cli.identification.fit_words import with_deviation
-from excite_cli.identification.load import LoadIdentification
 from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
 from excite_cli.summary.cells import percent

@@ -7,7 +7,6 @@ import numpy as np
 
 from excite_cli.config.spec import UntilSpec
 from excite_cli.diagnosis.next_motion import NextMotion
-from excite_cli.excitation.comparison import Comparison
 from excite_cli.excitation.dense_grid import flattered
 from excite_cli.excitation.ending import Ending
 from excite_cli.excitation.invariant import Invariants, design_for, invariants
@@ -15,6 +14,7 @@ from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Status
 from excite_cli.excitation.random_baseline import RandomMotion
+from excite_cli.excitation.random_comparison import Comparison
 from excite_cli.excitation.result import Result
 from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show

@@ -5,7 +5,7 @@ from typing import Any
 
 from excite_cli.diagnosis.words import place_in_words, title_of, value_in_words
 from excite_cli.identification.fit_words import short_number
-from excite_cli.scoring.records import Reason, Score, ScoredRun
+from excite_cli.scoring.records import RunExplanation, Score, ScoredRun
 from excite_cli.scoring.thresholds import Thresholds
 from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
@@ -96,7 +96,7 @@ def _beyond(run: ScoredRun) -> str:
     return f"{short_number(run.ratio[worst], 2)} times the tolerance on {worst}"
 
 
-def _reason(reason: Reason, found: Score) -> str:
+def _reason(reason: RunExplanation, found: Score) -> str:
     place = place_in_words(reason.effect, len(found.joint_names))
     name, value = next(iter(reason.parameters.items()))
     return (

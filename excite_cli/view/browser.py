@@ -25,7 +25,7 @@ from excite_cli.view.camera import fitted_camera
 from excite_cli.view.guarded_server import guarded
 from excite_cli.view.instants import Instants, instants_of
 from excite_cli.view.scene import build_scene
-from excite_cli.view.stage import Stage
+from excite_cli.view.stage import SceneNodes
 
 # What stands beside the moving robot in the browser: margins and joint positions, as HTML.
 
@@ -152,7 +152,7 @@ def play_in_browser(
         server.initial_camera.position = tuple(camera.eye)
         server.initial_camera.look_at = tuple(scene.center)
         server.initial_camera.fov = float(2 * np.arctan(3 / 2 / camera.focal))
-        player = _Player(server, Stage(server, scene), problem, segments, serving)
+        player = _Player(server, SceneNodes(server, scene), problem, segments, serving)
         player.update(time.monotonic())
         host = "localhost" if serving.host in ("127.0.0.1", "0.0.0.0", "::") else serving.host
         ready(f"http://{host}:{server.get_port()}", server.get_port())
@@ -170,7 +170,7 @@ class _Player:
     def __init__(
         self,
         server: Any,
-        stage: Stage,
+        stage: SceneNodes,
         problem: Problem,
         segments: Sequence[Segment],
         serving: Serving,

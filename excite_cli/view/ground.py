@@ -23,7 +23,7 @@ _BLUR = 1.6  # patches; it hides that a lamp is a few rays only
 Light = Callable[[Array, Array], Array]
 
 
-class Ground:
+class GroundPlane:
     """A level plane below `scene`; unseen from below."""
 
     def __init__(self, scene: Scene) -> None:

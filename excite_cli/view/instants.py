@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.constraints.base import Constraint
-from excite_cli.constraints.drawing import Nearest
+from excite_cli.constraints.drawing import NearestBodies
 from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.excitation.nearest import nearest_bodies
@@ -45,7 +45,7 @@ class Instants:
     poses: Poses
     mass: Array
     zmp: Array | None
-    nearest: Nearest | None
+    nearest: NearestBodies | None
     margins: tuple[MarginTrack, ...]
 
     def index_at(self, time: float) -> int:

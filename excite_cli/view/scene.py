@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.constraints.drawing import Drawing, GroundRegion
+from excite_cli.constraints.drawing import ConstraintScene, GroundRegion
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.geometry.obstacles import FLOOR, Box, Plane
@@ -22,7 +22,7 @@ _FEW = 24  # instants that tell how far a motion reaches
 
 
 @dataclass(frozen=True, eq=False)
-class Region:
+class GroundPolygon:
     """A convex part of the ground: corners (k, 2) in order [m] at `height` [m]."""
 
     corners: Array
@@ -47,7 +47,7 @@ class Scene:
     capsule_surfaces: tuple[Surface, ...]
     boxes: tuple[tuple[str, Surface], ...]
     walls: tuple[Plane, ...]
-    region: Region | None
+    region: GroundPolygon | None
     contacts: Array
     ground: float
     low: Array
@@ -107,7 +107,7 @@ def build_scene(problem: Problem, paths: list[Array], cell: float = 0.0) -> Scen
     )
 
 
-def _capsules(drawings: list[Drawing]) -> tuple[Capsule, ...]:
+def _capsules(drawings: list[ConstraintScene]) -> tuple[Capsule, ...]:
     """Every capsule once; self-collision and surroundings share theirs."""
     found = {id(capsule): capsule for drawing in drawings for capsule in drawing.capsules}
     return tuple(found.values())
@@ -166,20 +166,20 @@ def _ground(floor: float | None, height: float | None, foot: float, lowest: floa
     return foot if np.isfinite(foot) and lowest >= foot - _NEAR_BASE else lowest
 
 
-def _main_region(drawings: list[Drawing]) -> GroundRegion | None:
+def _main_region(drawings: list[ConstraintScene]) -> GroundRegion | None:
     """The one at a height of its own, as a contact with the ground has it, before others."""
     found = [drawing.region for drawing in drawings if drawing.region is not None]
     return next((each for each in found if each.height is not None), found[0] if found else None)
 
 
-def _region(kept: GroundRegion | None, ground: float) -> tuple[Region | None, Array]:
+def _region(kept: GroundRegion | None, ground: float) -> tuple[GroundPolygon | None, Array]:
     """As it is drawn, and the points of contact (k, 3)."""
     if kept is None:
         return None, np.zeros((0, 3))
     height = ground if kept.height is None else kept.height
     flat = np.zeros((0, 2)) if kept.contacts is None else kept.contacts
     contacts = np.column_stack([flat, np.full(len(flat), height)])
-    return Region(_polygon(kept.normals, kept.offsets), height), contacts
+    return GroundPolygon(_polygon(kept.normals, kept.offsets), height), contacts
 
 
 def _polygon(normals: Array, offsets: Array) -> Array:

@@ -23,7 +23,7 @@ _INK: Colour = (0.13, 0.15, 0.18)
 _LIFTED = 0.003  # [m]
 
 
-class Stage:
+class SceneNodes:
     """Nodes of `scene` on a viser server; `show` moves them."""
 
     def __init__(self, server: Any, scene: Scene) -> None:

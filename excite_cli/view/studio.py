@@ -15,7 +15,7 @@ from excite_cli.geometry.link_meshes import Poses
 from excite_cli.robot.model import Array
 from excite_cli.view.camera import Camera
 from excite_cli.view.geometry import Colour
-from excite_cli.view.ground import PAPER, Ground, Shade
+from excite_cli.view.ground import PAPER, GroundPlane, Shade
 from excite_cli.view.rays import Hits, Tracer
 from excite_cli.view.scene import Scene
 from excite_cli.view.surface import Surface, turn_to
@@ -132,7 +132,7 @@ class Studio:
     ) -> None:
         self._scene, self._camera, self._quality = scene, camera, quality
         self._lights = Lights.beside(azimuth, quality.lamp_rays, quality.sky_rays)
-        self._ground = Ground(scene)
+        self._ground = GroundPlane(scene)
         self._moving = [body for body in scene.bodies if body.joint != 0]
         still = [body for body in scene.bodies if body.joint == 0]
         self._still = Tracer([*(b.surface for b in still), *(box for _, box in scene.boxes)])

@@ -8,7 +8,7 @@ from excite_cli.geometry.obstacles import Plane
 from excite_cli.robot.model import Array
 from excite_cli.view.geometry import Colour
 from excite_cli.view.rays import Tracer
-from excite_cli.view.scene import Region, Scene
+from excite_cli.view.scene import GroundPolygon, Scene
 from excite_cli.view.surface import Surface
 
 # Okabe and Ito, as in the figures of reports.
@@ -39,12 +39,12 @@ class Pane:
         return np.asarray(self.face + (self.rim - self.face) * (1 - facing) ** 2)
 
 
-def region_pane(region: Region) -> Pane:
+def region_pane(region: GroundPolygon) -> Pane:
     """The balance region on the ground."""
     return Pane(Tracer([region_surface(region)]), np.array([REGION]), 0.45, 0.45)
 
 
-def region_surface(region: Region) -> Surface:
+def region_surface(region: GroundPolygon) -> Surface:
     """The region as triangles about its middle."""
     corners = np.column_stack(
         [region.corners, np.full(len(region.corners), region.height + _LIFTED)]

@@ -2,7 +2,7 @@
 
 from excite_cli.api.campaign_plans import at_pace, on_robot
 from excite_cli.api.loading import load_problem
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.diagnosis.records import EffectRecord
 from tests.cli.program import SMOKE
 

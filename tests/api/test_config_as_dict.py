@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from excite_cli import ConfigError, load_case, load_problem, plan, read_result
-from excite_cli.config.load import plain_values
+from excite_cli.config.load_spec import plain_values
 from tests.api.conftest import ROOT, SMOKE
 
 URDF = ROOT / "data" / "smoke_arm.urdf"

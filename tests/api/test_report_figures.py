@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from excite_cli.api.report_figures import Told, in_order
+from excite_cli.api.report_figures import ReportedFile, in_order
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.excitation.result import Result
 from excite_cli.identification.stored_model import StoredFit
@@ -19,7 +19,7 @@ def motions(*priors: str) -> Result:
 
 
 def _ordered(*files: tuple[str, Any]) -> list[str]:
-    told = [Told(Path("here") / name, Path(name).stem, content) for name, content in files]
+    told = [ReportedFile(Path("here") / name, Path(name).stem, content) for name, content in files]
     return [each.path.name for each in in_order(told)]
 
 

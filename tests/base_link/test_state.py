@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from excite_cli.base_link.rows import with_base
 from excite_cli.base_link.state import base_state, denoised
+from excite_cli.base_link.wrench_rows import with_base
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.config.wrench_spec import BaseStateSpec
 from excite_cli.errors import ConfigError, FileError

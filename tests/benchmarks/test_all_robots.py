@@ -15,7 +15,7 @@ from benchmarks.robots.sources import Source, sources
 from excite_cli.api.loading import load_case
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.effects.payload import Payload
-from excite_cli.simulation.ground_truth import Planted
+from excite_cli.simulation.ground_truth import PlantedEffect
 
 SMOKE = Path(__file__).parents[2] / "configs" / "smoke.yaml"
 PLANT = {
@@ -94,7 +94,7 @@ def test_effects_are_the_same_once_they_are_read_again() -> None:
             values = np.array([rng.uniform(each.low, each.high) for each in kind.parameters])
             if kind.known_by:
                 values = np.array([1.0])
-            text = words(Planted(kind(joints, shape), values), robot, takes)
+            text = words(PlantedEffect(kind(joints, shape), values), robot, takes)
             assert text.startswith(f"{name}@")
 
 
@@ -102,7 +102,9 @@ def test_a_payload_of_one_of_two_arms_stays_where_it_is() -> None:
     robot = load_case(SMOKE.with_name("talos_arms.yaml"), ()).robot
     values = np.array([1.5, 0.0, 0.0, 0.15, 0.02, 0.0, 0.02, 0.0, 0.0, 0.01])
     for joints in Payload.places(robot):
-        assert robot.joint_names[joints[0]] in words(Planted(Payload(joints), values), robot, {})
+        assert robot.joint_names[joints[0]] in words(
+            PlantedEffect(Payload(joints), values), robot, {}
+        )
 
 
 RECORDS = [

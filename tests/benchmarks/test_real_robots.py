@@ -20,7 +20,7 @@ from benchmarks.real_robots import (
     tx40,
     ur10,
 )
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from tests.cli.program import ROOT
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli.campaign.command import Command
+from excite_cli.campaign.command import MeasureCommand
 from excite_cli.campaign.measure import NotMeasuredError
 from excite_cli.errors import ConfigError
 from tests.campaign.campaign_process import program, said, take_in, until
@@ -23,7 +23,7 @@ def test_it_gets_motion_log_and_name_as_they_are(
 ) -> None:
     """Nothing in a name is a place to fill, for a shell, or an option."""
     body = "import json; json.dump(sys.argv[1:], open(sys.argv[2], 'w'))"
-    command = Command.of(f"{program(tmp_path, body)} --log={{data}},{{name}}")
+    command = MeasureCommand.of(f"{program(tmp_path, body)} --log={{data}},{{name}}")
     monkeypatch.chdir(tmp_path)
     Path(folder).mkdir()
     command.take(take_in(Path(folder)))
@@ -35,16 +35,16 @@ def test_it_gets_motion_log_and_name_as_they_are(
 def test_what_it_says_is_kept(tmp_path: Path) -> None:
     body = "print('connected'); print('oh', file=sys.stderr); sys.exit(3)"
     with pytest.raises(NotMeasuredError) as told:
-        Command.of(program(tmp_path, body)).take(take_in(tmp_path))
+        MeasureCommand.of(program(tmp_path, body)).take(take_in(tmp_path))
     assert "exit status 3. Its last line: " in str(told.value)
     assert {"connected", "oh"} == set((tmp_path / "m.txt").read_text().split())
 
 
 def test_no_log_and_no_program_are_told(tmp_path: Path) -> None:
     with pytest.raises(NotMeasuredError, match=r"wrote no .*log of m\.csv"):
-        Command.of(program(tmp_path, "pass")).take(take_in(tmp_path))
+        MeasureCommand.of(program(tmp_path, "pass")).take(take_in(tmp_path))
     with pytest.raises(NotMeasuredError, match="'no-such-program' cannot be run: No such file"):
-        Command.of("no-such-program {motion} {data}").take(take_in(tmp_path))
+        MeasureCommand.of("no-such-program {motion} {data}").take(take_in(tmp_path))
 
 
 def test_one_that_hangs_is_told_to_stop_the_robot_and_ended_with_what_it_started(
@@ -59,7 +59,7 @@ def test_one_that_hangs_is_told_to_stop_the_robot_and_ended_with_what_it_started
         time.sleep(600)
     """
     with pytest.raises(NotMeasuredError, match=r"still running after 5 s .*stopped the robot"):
-        Command.of(program(tmp_path, body), limit=_BEGUN).take(take_in(tmp_path))
+        MeasureCommand.of(program(tmp_path, body), limit=_BEGUN).take(take_in(tmp_path))
     child = said(tmp_path, "m.txt").split()[0]
 
     def state() -> str:
@@ -79,7 +79,7 @@ def test_one_that_hangs_is_told_to_stop_the_robot_and_ended_with_what_it_started
 )
 def test_lines_that_cannot_be(text: str, told: str) -> None:
     with pytest.raises(ConfigError) as error:
-        Command.of(text)
+        MeasureCommand.of(text)
     assert told in str(error.value)
     with pytest.raises(ConfigError, match="suffix with its dot"):
-        Command.of("a {motion} {data}", "csv")
+        MeasureCommand.of("a {motion} {data}", "csv")

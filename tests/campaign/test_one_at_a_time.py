@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli.campaign.command import Command
+from excite_cli.campaign.command import MeasureCommand
 from excite_cli.campaign.measure import StillRunningError
 from excite_cli.campaign.measured_log import is_measured
 from excite_cli.campaign.one_at_a_time import held_while_it_runs, left_in
-from excite_cli.campaign.processes import running
+from excite_cli.campaign.process_table import running
 from excite_cli.shown.note import Note
 from tests.campaign.campaign_process import PATIENCE, begun, program, said, start, take_in, until
 
@@ -93,9 +93,9 @@ def test_the_program_of_a_killed_campaign_is_waited_for_and_its_end_recorded(
     killed(tmp_path, 3.0, False)
     take = take_in(tmp_path)
     with pytest.raises(StillRunningError, match="still running"):
-        Command.of("x {motion} {data}", limit=0.2).wait_for_earlier(take)
+        MeasureCommand.of("x {motion} {data}", limit=0.2).wait_for_earlier(take)
     assert not take.data.exists()
-    Command.of("x {motion} {data}", limit=PATIENCE).wait_for_earlier(take)
+    MeasureCommand.of("x {motion} {data}", limit=PATIENCE).wait_for_earlier(take)
     assert take.data.read_text() == "whole"
     assert is_measured(take.data)
 
@@ -107,7 +107,7 @@ def test_the_limit_of_time_outlives_the_campaign(tmp_path: Path) -> None:
     campaign.kill()
     campaign.wait()
     take = take_in(tmp_path)
-    Command.of(line, limit=PATIENCE).wait_for_earlier(take)
+    MeasureCommand.of(line, limit=PATIENCE).wait_for_earlier(take)
     assert not take.data.exists()
 
 

@@ -7,10 +7,10 @@ import pytest
 from excite_cli.api.loading import load_case
 from excite_cli.campaign.records import (
     STATE,
-    Asked,
     Campaign,
+    CampaignOptions,
+    CampaignRound,
     PlayedMotion,
-    Round,
     RoundFindings,
     looked_for,
     pace_of,
@@ -30,9 +30,9 @@ WHOLE = Campaign(
     "robot: {}",
     "/somewhere",
     "print",
-    Asked(0.3, 5, 100.0, False, True),
+    CampaignOptions(0.3, 5, 100.0, False, True),
     (
-        Round(
+        CampaignRound(
             1,
             MOTIONS,
             RoundFindings(0.1, 0.02, ("spring on elbow",), ("a or b",), ("a or b",), 0.3),
@@ -49,7 +49,7 @@ def test_it_is_read_as_it_was_written(tmp_path: Path) -> None:
     assert read_campaign(tmp_path) == WHOLE
     assert WHOLE.rounds[0].missing == MOTIONS[1]
     assert WHOLE.seconds == 12.5  # of what is measured
-    other = Round(1, MOTIONS[:1])
+    other = CampaignRound(1, MOTIONS[:1])
     assert WHOLE.with_round(other).rounds == (other,)
 
 

@@ -11,12 +11,12 @@ from threading import Thread
 import pytest
 
 from excite_cli.campaign import command, supervised
-from excite_cli.campaign.command import Command
+from excite_cli.campaign.command import MeasureCommand
 from excite_cli.campaign.measure import NotMeasuredError, StillRunningError
 from excite_cli.campaign.measured_log import is_measured
 from excite_cli.campaign.one_at_a_time import left_in
-from excite_cli.campaign.processes import running
-from excite_cli.campaign.supervisor import Ended
+from excite_cli.campaign.process_table import running
+from excite_cli.campaign.supervisor import ProgramExit
 from tests.campaign.campaign_process import program, said, take_in, until
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
@@ -24,8 +24,8 @@ pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="ne
 _SERVE = """
 import signal, sys
 sys.path[:] = sys.argv[1:]
-from excite_cli.campaign import processes, supervisor
-send = processes.send_to_all
+from excite_cli.campaign import process_table, supervisor
+send = process_table.send_to_all
 {}
 supervisor.serve()
 """
@@ -49,7 +49,7 @@ def test_a_process_that_no_signal_ends_is_said_first(
     words = [sys.executable, "-P", "-c", _SERVE.format(WITHOUT_FORCE), *sys.path]
     monkeypatch.setattr(supervised, "command", lambda module: words)
     take, line = take_in(tmp_path), program(tmp_path, DEAF)
-    measure = Command.of(line, limit=3.0, grace=0.2)
+    measure = MeasureCommand.of(line, limit=3.0, grace=0.2)
     with pytest.raises(StillRunningError) as error:
         measure.take(take)
     pid = int(said(tmp_path, "m.txt"))
@@ -58,7 +58,7 @@ def test_a_process_that_no_signal_ends_is_said_first(
         assert "of the measuring program. The robot may move: stop it by hand" in str(error.value)
         # Its supervisor keeps the lock: the next one is not played beside it.
         with pytest.raises(StillRunningError, match=rf"process {pid} \("):
-            Command.of(line, limit=0.3).take(take)
+            MeasureCommand.of(line, limit=0.3).take(take)
     finally:
         os.kill(pid, signal.SIGKILL)
     until(lambda: not left_in(tmp_path) and pid not in running(), "the supervisor has ended, too")
@@ -69,7 +69,7 @@ def test_without_proc_the_group_is_ended(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(supervised, "command", lambda module: words)
     line = program(tmp_path, "if os.fork():\n    time.sleep(600)\n" + DEAF)
     with pytest.raises(NotMeasuredError, match="still running after 3 s"):
-        Command.of(line, limit=3.0, grace=0.2).take(take_in(tmp_path))
+        MeasureCommand.of(line, limit=3.0, grace=0.2).take(take_in(tmp_path))
     assert int(said(tmp_path, "m.txt")) not in running()
 
 
@@ -88,14 +88,14 @@ def test_what_still_runs_is_said_before_an_interruption(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """That comes once the program has ended."""
-    ends = iter([Ended(None, "asked", alive="process 4711 (python)"), Ended(1)])
+    ends = iter([ProgramExit(None, "asked", alive="process 4711 (python)"), ProgramExit(1)])
 
-    def interrupted(*given: object) -> Ended:
+    def interrupted(*given: object) -> ProgramExit:
         os.kill(os.getpid(), signal.SIGINT)
         return next(ends)
 
     monkeypatch.setattr(command, "followed", interrupted)
-    measure, take = Command.of("x {motion} {data}"), take_in(tmp_path)
+    measure, take = MeasureCommand.of("x {motion} {data}"), take_in(tmp_path)
     with interrupts():
         with pytest.raises(StillRunningError, match=r"^still running: process 4711 \(python\), "):
             measure.take(take)
@@ -107,7 +107,7 @@ def test_a_program_is_run_from_any_thread(tmp_path: Path) -> None:
     """Only the main thread hears signals; the others need not hold them."""
     take = take_in(tmp_path)
     line = program(tmp_path, "open(sys.argv[2], 'w').write('whole')")
-    thread = Thread(target=Command.of(line).take, args=(take,))
+    thread = Thread(target=MeasureCommand.of(line).take, args=(take,))
     thread.start()
     thread.join()
     assert is_measured(take.data)
@@ -127,7 +127,7 @@ open(sys.argv[2], "w").write("whole")
         raise OSError(28, "No space left on device")
 
     with pytest.raises(OSError, match="No space left"):
-        Command.of(program(tmp_path, body), tell=fail, grace=0.3).take(take_in(tmp_path))
+        MeasureCommand.of(program(tmp_path, body), tell=fail, grace=0.3).take(take_in(tmp_path))
     assert left_in(tmp_path) == []
 
 
@@ -150,7 +150,7 @@ time.sleep(600)
         until(lambda: "here" in said(tmp_path, "m.txt"), "the program has started")
         os.kill(os.getpid(), signal.SIGINT)
 
-    measure, terminal = Command.of(program(tmp_path, body), tell=fail), Thread(target=close)
+    measure, terminal = MeasureCommand.of(program(tmp_path, body), tell=fail), Thread(target=close)
     with interrupts():
         terminal.start()
         with pytest.raises(KeyboardInterrupt):

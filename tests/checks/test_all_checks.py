@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from excite_cli.checks.all_checks import check_dataset
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.regressor import standard_parameters
@@ -17,7 +17,7 @@ from excite_cli.errors import FileError
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.robot.model import Array, Robot, build_robot
-from excite_cli.simulation.ground_truth import Planted, plant
+from excite_cli.simulation.ground_truth import PlantedEffect, plant
 from tests.simulation.arms import arm, played
 
 LOGS = Path(__file__).resolve().parents[2] / "data"
@@ -27,7 +27,7 @@ SIZES = [10.0, 15.0, 8.0, 3.0, 2.0, 1.0]  # N·m of dry friction
 ROBOT = arm()
 
 
-def friction(j: int, size: float) -> Planted:
+def friction(j: int, size: float) -> PlantedEffect:
     return plant(kind_named("coulomb_friction"), (j,), size)
 
 

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from excite_cli.api.inspecting import inspect
 from excite_cli.api.loading import load_case
-from excite_cli.checks.result import Result
+from excite_cli.checks.check_result import CheckResult
 from excite_cli.checks.rows import NAMES, of_description
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.robot.model import Array, build_robot
@@ -72,7 +72,7 @@ def urdf_of(links: list[Link]) -> str:
     return f"{text}</robot>"
 
 
-def judged(links: list[Link], **keys: Any) -> list[Result]:
+def judged(links: list[Link], **keys: Any) -> list[CheckResult]:
     """What is doubted, but for what test_bodies.py tries."""
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "arms.urdf").write_text(urdf_of(links), encoding="utf-8")

@@ -13,7 +13,7 @@ import pytest
 from excite_cli.checks import rows
 from excite_cli.checks.all_checks import look
 from excite_cli.checks.own import GROUP, own_checks
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.errors import ExciteWarning
 from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from excite_cli.checks.all_checks import look
+from excite_cli.checks.check_result import CheckResult
 from excite_cli.checks.foreign_runs import foreign_runs
-from excite_cli.checks.result import Result
 from excite_cli.checks.samples import Samples, samples_of
 from excite_cli.checks.sentences import BELONG
 from excite_cli.checks.set_up_search import _candidates, beyond_limits
 from excite_cli.checks.setup import Setup
 from excite_cli.checks.textbook_fit import TextbookFit
 from excite_cli.config.commented_yaml import with_values
-from excite_cli.config.load import load_spec, spec_of
+from excite_cli.config.load_spec import load_spec, spec_of
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.effects.catalogue import kind_named
@@ -48,7 +48,7 @@ def declaring(**keys: Any) -> Spec:
     return spec_of(with_values(SPEC.model_dump(mode="json", exclude_unset=True), values))
 
 
-def found(data: Dataset, spec: Spec = SPEC, robot: Robot = ROBOT) -> list[Result]:
+def found(data: Dataset, spec: Spec = SPEC, robot: Robot = ROBOT) -> list[CheckResult]:
     processing = choose_processing(data.runs, spec.measurement.filter)
     return look(robot, data.runs, prepare_all(data.runs, processing), spec)
 

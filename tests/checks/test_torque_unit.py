@@ -9,7 +9,7 @@ import pytest
 
 from excite_cli.api.loading import Case, load_data
 from excite_cli.checks.all_checks import check_dataset
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.effects.catalogue import kind_named

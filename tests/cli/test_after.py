@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.excitation.problem import build_problem
 from excite_cli.store.diagnosis_file import write_diagnosis
 from excite_cli.store.result_file import read_result

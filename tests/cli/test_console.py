@@ -17,10 +17,10 @@ from excite_cli.cli.completion import (
     complete_robot,
 )
 from excite_cli.cli.console import Terminal
-from excite_cli.cli.ending import run_guarded
+from excite_cli.cli.exit_status import run_guarded
 from excite_cli.cli.start_line import Best
 from excite_cli.errors import FileError
-from excite_cli.excitation.progress import Figure, Measure, Progress, Stage
+from excite_cli.excitation.progress import Figure, Progress, ProgressMeasure, Stage
 from excite_cli.export.motions import MOTION_EXPORTERS
 from excite_cli.robot.overview import known_robots
 
@@ -82,14 +82,16 @@ def test_robots_have_kinds() -> None:
 def test_the_best_so_far_keeps_all_limits() -> None:
     best = Best()
 
-    def words(value: float, margin: float, measure: Measure = Measure.CONDITION_NUMBER) -> str:
+    def words(
+        value: float, margin: float, measure: ProgressMeasure = ProgressMeasure.CONDITION_NUMBER
+    ) -> str:
         figure = Figure(measure, value)
         return best.words(Progress(1, figure, margin, 0.1, Stage(1, 3)))
 
     assert words(9.0, -0.1) == "condition number 9.00"
     assert words(12.0, 0.1) == "condition number 12.00 (best 12.00)"
     assert words(5.0, -0.1) == "condition number 5.00 (best 12.00)"
-    assert words(3.0, 0.1, Measure.DIVERGENCE) == "divergence 3"
+    assert words(3.0, 0.1, ProgressMeasure.DIVERGENCE) == "divergence 3"
 
 
 def test_a_terminal_does_not_obey_names_of_files(

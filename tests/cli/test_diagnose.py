@@ -13,7 +13,7 @@ import yaml
 
 from excite_cli.api.diagnosing import diagnose
 from excite_cli.api.loading import load_case
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.store.diagnosis_file import read_diagnosis
 from tests.cli.conftest import Run
 from tests.cli.program import SMOKE, Program

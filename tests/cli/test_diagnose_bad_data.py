@@ -12,7 +12,7 @@ import yaml
 
 from excite_cli.api.loading import Case, load_data
 from excite_cli.checks.all_checks import check_dataset
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Dataset, Run

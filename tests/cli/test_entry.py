@@ -6,7 +6,7 @@ import pytest
 
 from excite_cli.api.approach import start_posture
 from excite_cli.cli.options import start_from
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.errors import ConfigError
 from excite_cli.robot.model import build_robot
 from tests.cli.conftest import Run

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.measurement.motion_files import read_own_motion
 from excite_cli.robot.model import build_robot
 from excite_cli.store.result_file import read_result

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.measurement.hdf5_writer import write_dataset
 from excite_cli.robot.model import Robot, build_robot

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.trust.robot_files import VALID
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from tests.cli.program import BRIEF, EXCITE, Program, environment
 from tests.cli.terminal import seen_on_a_terminal
 from tests.proposal.robots import GOOD, arm, joint, link, written

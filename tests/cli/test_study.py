@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.measurement.hdf5_writer import write_dataset
 from excite_cli.robot.model import build_robot
 from excite_cli.simulation.build import true_inertias

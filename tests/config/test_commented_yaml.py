@@ -8,7 +8,7 @@ from excite_cli.config.commented_yaml import (
     commented_yaml,
     with_values,
 )
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 
 TREE = {
     "robot": {"urdf": "a.urdf", "joints": [f"a_long_name_of_joint_{k}" for k in range(9)]},

@@ -15,7 +15,7 @@ from excite_cli.config import (
     spec,
     trajectory_spec,
 )
-from excite_cli.config.load import MAX_BYTES, load_spec, parse_spec
+from excite_cli.config.load_spec import MAX_BYTES, load_spec, parse_spec
 from excite_cli.config.section import Section
 from excite_cli.config.strict_yaml import MAX_DEPTH
 from excite_cli.errors import ConfigError

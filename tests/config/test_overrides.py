@@ -1,7 +1,7 @@
 import pytest
 
 from excite_cli.config.constraints_spec import DiscSpec
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.config.spec import Spec
 from excite_cli.config.trajectory_spec import BSplineSpec
 from excite_cli.errors import ConfigError

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from excite_cli.config.constraints_spec import ConstraintsSpec, JointLimitsSpec
-from excite_cli.config.load import load_spec, parse_spec, spec_as_yaml
+from excite_cli.config.load_spec import load_spec, parse_spec, spec_as_yaml
 from excite_cli.config.robot_spec import JointLimits, RobotSpec
 from excite_cli.config.spec import OptimizerSpec, Spec
 from excite_cli.config.trajectory_spec import FourierSpec

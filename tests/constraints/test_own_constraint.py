@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from excite_cli.config.load import parse_spec, spec_as_yaml
+from excite_cli.config.load_spec import parse_spec, spec_as_yaml
 from excite_cli.constraints.catalogue import OWN
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.admissible import path_of, worst_margins
 from excite_cli.excitation.inspection import Look, inspect
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
-from excite_cli.report.campaign import Campaign
+from excite_cli.report.campaign import RebuiltResult
 from excite_cli.report.margin_section import margin_section
 from excite_cli.report.motion_figure import draw_margins
 from excite_cli.report.motion_section import motion_section
@@ -71,7 +71,7 @@ def test_check_judges_it(kept: tuple[Problem, Result]) -> None:
 def test_reports_and_views_show_it(kept: tuple[Problem, Result]) -> None:
     problem, result = kept
     (motion,) = result.motions
-    campaign = Campaign("own.h5", result, problem)
+    campaign = RebuiltResult("own.h5", result, problem)
     assert "Joint power" in str(margin_section(campaign))
     assert motion_section(campaign).blocks
     figure = draw_margins(motion, problem)

@@ -14,7 +14,7 @@ from excite_cli.config.constraints_spec import (
     PolygonSpec,
     TorqueSpec,
 )
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.constraints.balance import Balance
 from excite_cli.constraints.base import Array, Constraint
 from excite_cli.constraints.catalogue import build_constraints

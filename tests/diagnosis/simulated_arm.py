@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.dynamics.base_parameters import find_base_parameters
@@ -18,7 +18,7 @@ from tests.cli.program import SMOKE
 
 pytest.importorskip("mujoco")
 
-from excite_cli.simulation.ground_truth import Planted, plant
+from excite_cli.simulation.ground_truth import PlantedEffect, plant
 from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import Simulation, simulate
@@ -40,7 +40,7 @@ def motion(number: int, seconds: float = 5.0) -> PlannedMotion:
 
 def planted(
     kind: str, joints: int | tuple[int, ...], value: float, *runs: int, **others: float
-) -> Planted:
+) -> PlantedEffect:
     """In all runs if none is named."""
     on = (joints,) if isinstance(joints, int) else joints
     one = plant(kind_named(kind), on, value, others)
@@ -48,7 +48,7 @@ def planted(
 
 
 def simulated(
-    effects: Sequence[Planted],
+    effects: Sequence[PlantedEffect],
     runs: Sequence[int] = (1, 2, 3),
     seconds: float = 5.0,
     rate: float = 200.0,
@@ -62,7 +62,7 @@ def simulated(
     return simulate(ROBOT, motions, how, effects, declared_effects(given, ROBOT))
 
 
-def played(effects: Sequence[Planted], *how: Any, **settings: Any) -> Dataset:
+def played(effects: Sequence[PlantedEffect], *how: Any, **settings: Any) -> Dataset:
     return simulated(effects, *how, **settings).dataset
 
 

@@ -7,18 +7,18 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import qr
 
-from excite_cli.config.load import load_spec, spec_as_yaml
+from excite_cli.config.load_spec import load_spec, spec_as_yaml
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.candidates import effect_of
 from excite_cli.diagnosis.covariate import Aspect, Covariate
 from excite_cli.diagnosis.records import (
-    Absorbed,
+    ConfoundedCandidate,
     Diagnosis,
     EffectRecord,
+    ErrorReduction,
+    ExcessResidual,
     Information,
-    LargeRest,
     NamedEffect,
-    Removed,
     Round,
     Suspect,
 )
@@ -107,10 +107,13 @@ def make_diagnosis(
                 0.2,
                 tuple(rivals),
                 verdict=HeldOutVerdict.CONFIRMED,
-                removes={"elbow": Removed(0.05, 0.06, 1.5), names[0]: Removed(-0.01, -0.01, -0.1)},
+                removes={
+                    "elbow": ErrorReduction(0.05, 0.06, 1.5),
+                    names[0]: ErrorReduction(-0.01, -0.01, -0.1),
+                },
             ),
         ),
-        absorbed=(Absorbed("armature", (names[0],), ("Izz[shoulder_yaw]",), 1e-5),),
+        absorbed=(ConfoundedCandidate("armature", (names[0],), ("Izz[shoulder_yaw]",), 1e-5),),
         held_out_run="run_3",
         before=replace(errors, mean_relative=0.2),
         after=errors,
@@ -129,8 +132,8 @@ def make_diagnosis(
         ),
         versions={"excite-cli": "0"},
         seconds=1.5,
-        large_rests=(
-            LargeRest(
+        excess_residuals=(
+            ExcessResidual(
                 "elbow", 0.8, 0.04, 0.1, "band", True, 0.6,
                 (Covariate("position", "elbow"), Covariate("load", "elbow")),
             ),

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.diagnosis.aliases import absorbed_effects
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.modelled_run import Model
+from excite_cli.diagnosis.modelled_run import DeclaredModel
 from excite_cli.diagnosis.noise_model import NoiseModel
-from excite_cli.diagnosis.records import Absorbed
+from excite_cli.diagnosis.records import ConfoundedCandidate
 from excite_cli.diagnosis.schur import ABSORBED
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.dynamics.regressor import standard_parameters
@@ -29,7 +29,7 @@ ROBOT = build_robot(load_spec(SMOKE).robot, SMOKE.parent)
 
 def absorbed(
     effects: list[Effect], chosen: tuple[int, ...] = ()
-) -> dict[tuple[str, str], Absorbed]:
+) -> dict[tuple[str, str], ConfoundedCandidate]:
     """By kind and joint, for a lively motion."""
     dataset = measured(ROBOT, standard_parameters(ROBOT), noise=0.1, seconds=8.0)
     found = regression_of(ROBOT, dataset)
@@ -49,7 +49,9 @@ def absorbed(
         tuple(run.tau for run in found.runs),
     )
     evidence = data.evidence(candidates, NoiseModel.white(np.ones(ROBOT.n)))
-    records = absorbed_effects(evidence, candidates, chosen, Model(ROBOT, found.base, (), None))
+    records = absorbed_effects(
+        evidence, candidates, chosen, DeclaredModel(ROBOT, found.base, (), None)
+    )
     return {(each.kind, each.joints[0]): each for each in records}
 
 

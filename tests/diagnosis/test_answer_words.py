@@ -45,7 +45,7 @@ def found(
         relative_moving=dict.fromkeys(names, 0.5),
     )  # fmt: skip
     end = replace(PLAIN.after, mean_relative=mean, mean_relative_moving=mean, relative_moving=after)
-    return replace(PLAIN, effects=effects, before=before, after=end, large_rests=(), **changes)
+    return replace(PLAIN, effects=effects, before=before, after=end, excess_residuals=(), **changes)
 
 
 def everywhere(part: float) -> dict[str, float]:
@@ -95,10 +95,10 @@ def test_one_effect_is_told_by_its_name_and_the_rest_by_what_it_depends_on() -> 
     )
     # What stays is told with what it depends on.
     of = (Covariate("position", "elbow", Aspect.HISTORY), Covariate("time"))
-    rest = replace(PLAIN.large_rests[0], depends_on=of)
+    rest = replace(PLAIN.excess_residuals[0], depends_on=of)
     answer = found(effect("coulomb_friction", "elbow", RUBS, everywhere(0.4)),
                    left=(0.1, 0.1))  # fmt: skip
-    told = answer_in_words(replace(answer, large_rests=(rest,)))
+    told = answer_in_words(replace(answer, excess_residuals=(rest,)))
     assert (
         "Residual 10% of the torque. The residual of elbow depends on history of angle of elbow "
         "and time. Next: "
@@ -117,7 +117,7 @@ def test_a_fit_of_kept_inertias_has_its_share() -> None:
 
 def test_nothing_and_nothing_good() -> None:
     assert answer_in_words(found()).startswith("Nothing is missing: ")
-    some = replace(found(), large_rests=PLAIN.large_rests)
+    some = replace(found(), excess_residuals=PLAIN.excess_residuals)
     assert answer_in_words(some).startswith("No effect of the catalogue explains the residual")
     worse = found(effect("spring", "elbow", SPRING, everywhere(-0.1)), left=(0.7, 0.7))
     assert answer_in_words(worse).startswith("The held-out error did not fall: ")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.comparison import Comparison
+from excite_cli.diagnosis.comparison import ModelComparison
 from excite_cli.diagnosis.search_loop import SearchResult
 from excite_cli.diagnosis.sufficient import sufficient
 from excite_cli.diagnosis.textbook import everyday, textbook
@@ -57,9 +57,9 @@ def traced_of(sizes: Sequence[tuple[Effect, float]], seed: int = 0) -> SearchRes
     return replace(found, usual=usual_of_unit_columns(1, FIXED))
 
 
-def models_of(given: SearchResult) -> Comparison:
+def models_of(given: SearchResult) -> ModelComparison:
     every = range(len(given.candidates))
-    return Comparison(given.data, given.candidates, every, given.levels)
+    return ModelComparison(given.data, given.candidates, every, given.levels)
 
 
 def everyday_traced(

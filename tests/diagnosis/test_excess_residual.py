@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from excite_cli.diagnosis.excess_residual import large_rests
-from excite_cli.diagnosis.records import LargeRest
+from excite_cli.diagnosis.excess_residual import excess_residuals
+from excite_cli.diagnosis.records import ExcessResidual
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Signals
 from excite_cli.identification.noise_floor import NoiseFloor
@@ -37,7 +37,7 @@ def left(
     slow: float = 0.0,
     single: float = 0.0,
     reversal: float = 0.0,
-) -> tuple[LargeRest, ...]:
+) -> tuple[ExcessResidual, ...]:
     """Noise; on joint a a map of both angles, or of a `single` one; on b a wave of its own.
 
     `reversal`: on joint a, within 0.055 s of every change of its direction.
@@ -69,7 +69,7 @@ def left(
     predicted = [5.0 * run.q for run in prepared]
     model = SimpleNamespace(robot=SimpleNamespace(joint_names=("a", "b")))
     traced: Any = SimpleNamespace(data=data, signals=signals, model=model)
-    return large_rests(traced, predicted, residuals, recorded, PROCESSING, floor)[0]
+    return excess_residuals(traced, predicted, residuals, recorded, PROCESSING, floor)[0]
 
 
 def test_what_is_left_beside_the_noise_is_said() -> None:

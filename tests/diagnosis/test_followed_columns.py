@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from excite_cli.config.load import load_spec, spec_as_yaml
+from excite_cli.config.load_spec import load_spec, spec_as_yaml
 from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.diagnosis.words import changes_in_words
 from excite_cli.effects.catalogue import catalogue, kind_named

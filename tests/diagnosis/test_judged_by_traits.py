@@ -15,7 +15,7 @@ from excite_cli.diagnosis.candidates import Candidate, possible_effects, shapes_
 from excite_cli.diagnosis.in_runs import SeenRuns
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
-from excite_cli.diagnosis.search import Search
+from excite_cli.diagnosis.search import CandidateSearch
 from excite_cli.diagnosis.search_loop import _usual
 from excite_cli.effects.base import Effect, Signals, Tier
 from excite_cli.effects.catalogue import catalogue
@@ -74,11 +74,11 @@ REFINED: Mapping[str, tuple[str, ...]] = {
 }
 
 
-def a_search(effects: Sequence[Effect], mix: Array, torque: Sequence[float]) -> Search:
+def a_search(effects: Sequence[Effect], mix: Array, torque: Sequence[float]) -> CandidateSearch:
     """On columns of joint 0 that are orthogonal directions times `mix`; noise is of RMS one."""
     data, candidates = planted(effects, on_joint_0(torque), mix)
     plain = data.evidence(candidates, NoiseModel.white(np.ones(2)))
-    return Search(Judgement(plain, plain, candidates, NO_VETO, anything))
+    return CandidateSearch(Judgement(plain, plain, candidates, NO_VETO, anything))
 
 
 def of(kind: str) -> Effect:

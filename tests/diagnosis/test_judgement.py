@@ -11,7 +11,7 @@ from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.schur import Gain
-from excite_cli.diagnosis.search import Search
+from excite_cli.diagnosis.search import CandidateSearch
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.base import Effect
 from excite_cli.effects.coulomb_friction import CoulombFriction
@@ -336,7 +336,7 @@ def test_without_a_weight_or_one_that_is_hardly_known_a_gain_has_no_name(std: fl
     judge = weighed(0.04, std, [effect("torque_gain")])
     assert judge.identified_by_prior_only(0, []) == (std > 0.0)
     assert 0 in judge.failing([0])
-    assert Search(judge).run() == []
+    assert CandidateSearch(judge).run() == []
 
 
 def test_of_what_a_weight_tells_as_well_the_gain_of_all_rows_is_named() -> None:
@@ -344,8 +344,8 @@ def test_of_what_a_weight_tells_as_well_the_gain_of_all_rows_is_named() -> None:
     effects = [effect("torque_offset", 0), effect("torque_gain", 0), effect("wrench_gain", 0, 1)]
     for std in (5.0, 0.3):  # by 0.3, inertias are bent so that the error shows it as well
         judge = weighed(0.04, std, effects)
-        assert Search(judge).run() == [2]
-        assert Search(judge).run([0]) == [2]
+        assert CandidateSearch(judge).run() == [2]
+        assert CandidateSearch(judge).run([0]) == [2]
     assert judge.left_out_gain([], [0]) > judge.left_out_gain([], [2]) + 0.2
     for i, alone in enumerate(effects[:2]):
         extra = judge.price(i, 1) - weighed(0.04, 0.3, [alone]).price(0, 1)

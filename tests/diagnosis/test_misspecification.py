@@ -9,7 +9,7 @@ import pytest
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.misspecification import approximations
-from excite_cli.diagnosis.records import Approximation, LargeRest
+from excite_cli.diagnosis.records import Approximation, ExcessResidual
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
@@ -29,10 +29,10 @@ from tests.robot.random_robots import random_robot
 NAMES = ("a", "b")
 
 
-def left(joint: str, *codes: str, share: float) -> LargeRest:
+def left(joint: str, *codes: str, share: float) -> ExcessResidual:
     """What surely is left of a joint: this share of it is predicted, and no more exceeds noise."""
     of = tuple(Covariate.of_code(code) for code in codes)
-    return LargeRest(joint, 1.0, 0.1, None, "", True, share, of)
+    return ExcessResidual(joint, 1.0, 0.1, None, "", True, share, of)
 
 
 def function_of(*codes: str) -> Approximation:
@@ -185,7 +185,7 @@ def test_what_can_be_predicted_and_is_more_makes_a_name_doubtful(
     """The residual has the energy one; of that, 0.8 can be predicted."""
     data, candidates = planted([effect("load_dependent_friction")], np.array([[size, 0.0]]))
     depends = (Covariate("position", "a"), Covariate("load", "a"))
-    rest = LargeRest("a", 1.0, 0.1, 0.4, "band", certain, 0.8, depends)
+    rest = ExcessResidual("a", 1.0, 0.1, 0.4, "band", certain, 0.8, depends)
     found = approximations(traced(data, candidates, [0]), NAMES, [rest])
     assert set(found) == expected
     assert all(each == Approximation(covariates=depends) for each in found.values())
@@ -217,7 +217,7 @@ def test_a_mean_beside_a_large_rest_is_doubted_for_all_of_it(
     torque[0, 0] = np.sqrt(0.99 / share) * (1.05 if above else 0.95)
     data, candidates = planted([mean], torque)
     depends = (Covariate("position", "b"), Covariate("speed", "b"))
-    rest = LargeRest("a", 1.0, 0.1, 0.1, "band", True, 0.35, depends)
+    rest = ExcessResidual("a", 1.0, 0.1, 0.1, "band", True, 0.35, depends)
     found = approximations(traced(data, candidates, [0]), NAMES, [rest])
     assert set(found) == (set() if above else {0})
     noisy = replace(rest, predictable=0.25)  # and no map, of which a constant is the mean
@@ -239,7 +239,7 @@ def test_a_wave_that_was_not_seen_to_repeat_is_doubted_beside_a_large_rest(
     torque = np.array([[10.0, 0.0], [10.0, 0.0], [3.0, 0.0]])
     data, candidates = planted([wave, constant], torque)
     there = replace(traced(data, candidates, [0, 1]), signals=(signals,) * len(FOLDS))
-    rest = LargeRest("a", 1.0, 0.1, 0.2, "band", True, 0.1, ())
+    rest = ExcessResidual("a", 1.0, 0.1, 0.2, "band", True, 0.1, ())
     assert set(approximations(there, NAMES, [rest])) == ({0, 1} if doubted else set())
     elsewhere = replace(rest, joint="b")
     assert 0 not in approximations(there, NAMES, [elsewhere])

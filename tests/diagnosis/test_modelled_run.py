@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import null_space
 
-from excite_cli.diagnosis.modelled_run import Model
+from excite_cli.diagnosis.modelled_run import DeclaredModel
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.regressor import Regressor, standard_parameters
 from excite_cli.effects.catalogue import catalogue
@@ -15,12 +15,12 @@ from tests.robot.random_robots import random_robot
 
 
 @pytest.fixture(scope="module")
-def model() -> Model:
+def model() -> DeclaredModel:
     robot = random_robot(4, joints=3, branches=False)
-    return Model(robot, find_base_parameters(robot), (), None)
+    return DeclaredModel(robot, find_base_parameters(robot), (), None)
 
 
-def test_of_all_inertias_that_agree_the_nearest_is_taken(model: Model) -> None:
+def test_of_all_inertias_that_agree_the_nearest_is_taken(model: DeclaredModel) -> None:
     """Parameters of effects follow the inertial ones and do not matter."""
     base, robot = model.base, model.robot
     fitted = np.random.default_rng(1).normal(size=base.rank)
@@ -41,7 +41,7 @@ def test_of_all_inertias_that_agree_the_nearest_is_taken(model: Model) -> None:
 
 
 @pytest.mark.parametrize("kept", [False, True])
-def test_what_is_known_is_what_scales_say_and_the_urdf(model: Model, kept: bool) -> None:
+def test_what_is_known_is_what_scales_say_and_the_urdf(model: DeclaredModel, kept: bool) -> None:
     rng = np.random.default_rng(6)
     effects, base = (catalogue()["spring"]((0,)),), model.base
     weighed = rng.normal(size=(3, base.rank + 2 + 1))

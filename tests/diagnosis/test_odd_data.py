@@ -10,7 +10,7 @@ import pytest
 from excite_cli.api.diagnosing import diagnose
 from excite_cli.api.identifying import identify
 from excite_cli.api.loading import Case
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import ExciteError

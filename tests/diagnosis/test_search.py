@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
-from excite_cli.diagnosis.search import Search
+from excite_cli.diagnosis.search import CandidateSearch
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect
 from excite_cli.robot.model import Array
@@ -74,7 +74,7 @@ def search(
     evidence = data.evidence(candidates, ONE)
     sizes = PossibleSizes(candidates, spread_of(evidence.covariance, 1.0), LARGE)
     allowed = sizes if signs else anything
-    found = Search(Judgement(evidence, evidence, candidates, rules, allowed), most).run()
+    found = CandidateSearch(Judgement(evidence, evidence, candidates, rules, allowed), most).run()
     assert len(found) == len(set(found))
     return set(found)
 
@@ -287,14 +287,14 @@ def test_what_is_closed_is_not_put_in_to_complete_either() -> None:
     effects = [VISCOUS, COULOMB, effect("nonlinear_viscous_friction", power=0.5)]
     data, candidates = planted(effects, [2.0, 0.0, 2.0], np.eye(3))
     judge = judged(data, candidates)
-    assert set(Search(judge).run()) == {0, 1, 2}
-    assert set(Search(judge, closed={candidates[1].place}).run((2, 0))) == {0, 2}
+    assert set(CandidateSearch(judge).run()) == {0, 1, 2}
+    assert set(CandidateSearch(judge, closed={candidates[1].place}).run((2, 0))) == {0, 2}
 
 
 def test_what_does_not_hold_in_the_end_leaves_its_place_to_another() -> None:
     """The second explains most of what the first does; the first is dropped when all is chosen."""
 
-    class Dropping(Search):
+    class Dropping(CandidateSearch):
         def pruned(self, chosen: list[int]) -> list[int]:
             return [i for i in chosen if i != 0]
 
@@ -303,7 +303,7 @@ def test_what_does_not_hold_in_the_end_leaves_its_place_to_another() -> None:
     assert search(data, candidates) == {0}
     judge = judged(data, candidates)
     assert set(Dropping(judge).run()) == {1}
-    assert set(Search(judge).run()) == {0}
+    assert set(CandidateSearch(judge).run()) == {0}
 
 
 def judge_of_three() -> Judgement:
@@ -317,14 +317,14 @@ def test_steps_that_go_round_end_with_the_cheapest(monkeypatch: pytest.MonkeyPat
     turns = {(): [2], (2,): [0], (0,): [1], (1,): [0]}  # 2, then 0 and 1 in turn
     asked: list[tuple[int, ...]] = []
 
-    def polish(_: Search, chosen: list[int]) -> list[int]:
+    def polish(_: CandidateSearch, chosen: list[int]) -> list[int]:
         asked.append(tuple(chosen))
         return turns[tuple(chosen)]
 
-    monkeypatch.setattr(Search, "_forward", lambda _, chosen, latest: chosen)
-    monkeypatch.setattr(Search, "_polish", polish)
+    monkeypatch.setattr(CandidateSearch, "_forward", lambda _, chosen, latest: chosen)
+    monkeypatch.setattr(CandidateSearch, "_polish", polish)
     assert judge.cost([0]) < judge.cost([1]) < judge.cost([2])
-    assert Search(judge)._settled([]) == [0]
+    assert CandidateSearch(judge)._settled([]) == [0]
     assert asked == [(), (2,), (0,), (1,)]
 
 
@@ -336,11 +336,11 @@ def test_more_names_in_place_of_those_that_do_not_hold_are_no_answer(
     judge = judge_of_three()
     sets = iter([[0, 1], second])
     holds = iter([[0], [1]])
-    monkeypatch.setattr(Search, "_settled", lambda *_: next(sets, [1]))
-    monkeypatch.setattr(Search, "pruned", lambda *_: next(holds, [1]))
+    monkeypatch.setattr(CandidateSearch, "_settled", lambda *_: next(sets, [1]))
+    monkeypatch.setattr(CandidateSearch, "pruned", lambda *_: next(holds, [1]))
     monkeypatch.setattr(judge, "cost", lambda chosen: -float(len(chosen)))
     monkeypatch.setattr("excite_cli.diagnosis.search._GROWN", 1.0)
-    assert Search(judge).run() == expected
+    assert CandidateSearch(judge).run() == expected
 
 
 @pytest.mark.parametrize(("power", "beside", "replacing"), [(0.5, {0, 1, 2}, {0}), (2.0, {2}, {1})])

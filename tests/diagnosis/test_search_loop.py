@@ -133,7 +133,9 @@ def test_a_cut_leaves_what_is_beside_it() -> None:
     )
     sizes = [len(each.parameters) for each in effects]
     values = np.concatenate([[0.5, 0.6], *(np.full(w, k) for k, w in enumerate(sizes))])
-    rest = search_loop.beside_cuts(search_loop.Fit(np.zeros(10), effects, values, np.ones(4), 1.0))
+    rest = search_loop.beside_cuts(
+        search_loop.PassFit(np.zeros(10), effects, values, np.ones(4), 1.0)
+    )
     assert rest.effects == (effects[0], effects[2])
     assert rest.values.tolist() == [0.5, 0.6, *sizes[0] * [0], *sizes[2] * [2]]
     # A search without cuts knows no kind of them.
@@ -164,8 +166,8 @@ def test_a_pass_that_is_cut_short_keeps_what_the_pass_before_it_found() -> None:
         assert sorted(search_loop._searched(judge, 60, data, model, lambda: True)) == named
 
 
-def fit_of(*effects: Effect) -> search_loop.Fit:
-    return search_loop.Fit(np.zeros(10), effects, np.zeros(len(effects)), np.ones(2), 100.0)
+def fit_of(*effects: Effect) -> search_loop.PassFit:
+    return search_loop.PassFit(np.zeros(10), effects, np.zeros(len(effects)), np.ones(2), 100.0)
 
 
 def test_a_fit_is_settled_once_its_shapes_are() -> None:

@@ -54,7 +54,7 @@ def test_what_is_left_is_said_of_every_joint() -> None:
     assert "Excess residual: elbow 0.8" in left["elbow"]
     assert left["slide"].startswith("it does not move in the held-out data")
     quiet = next(j for j in found.joint_names if j not in {"elbow", "slide"}
-                 and j not in {each.joint for each in found.large_rests})  # fmt: skip
+                 and j not in {each.joint for each in found.excess_residuals})  # fmt: skip
     assert left[quiet].endswith("was found in what is left of the training data.")
 
 

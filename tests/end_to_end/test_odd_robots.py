@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.excitation.admissible import verdicts
 from excite_cli.excitation.problem import Problem, build_problem

@@ -11,11 +11,11 @@ import h5py
 import pytest
 
 from excite_cli import load_case, run_campaign, simulate
-from excite_cli.api.campaigning import Asked, Inbox
+from excite_cli.api.campaigning import CampaignOptions, Inbox
 from excite_cli.api.simulating import SimulationSettings
 from excite_cli.campaign import command, inbox
 from excite_cli.campaign.measured_log import record_measured
-from excite_cli.campaign.supervisor import Ended
+from excite_cli.campaign.supervisor import ProgramExit
 from excite_cli.shown.note import Note
 from tests.campaign.campaign_process import PATIENCE, until
 from tests.cli.program import Program
@@ -105,9 +105,9 @@ def test_nothing_is_played_while_something_may_still_move_the_robot(
 ) -> None:
     tries = []
 
-    def not_ended(*given: object) -> Ended:
+    def not_ended(*given: object) -> ProgramExit:
         tries.append(given)
-        return Ended(None, "limit", alive="process 4711 (python)")
+        return ProgramExit(None, "limit", alive="process 4711 (python)")
 
     monkeypatch.setattr(command, "followed", not_ended)
     run = begun(*ASKED, *LINE, "--resume", "--retries", "5")
@@ -126,7 +126,7 @@ def test_an_inbox_takes_whole_logs_of_its_motion_and_of_today(
     monkeypatch.setattr(inbox, "_STILL", 0.3)
     box, said, notes = begun.folder / "box", list[str](), list[Note]()
     case = load_case(begun.folder / "smoke.yaml", OVERRIDES)
-    asked = Asked(entry=False, plain=True, most_rounds=1)
+    asked = CampaignOptions(entry=False, plain=True, most_rounds=1)
     campaign = Thread(
         target=run_campaign,
         args=(case, Inbox(box, said.append, ".h5"), begun.folder / "campaign", asked),

@@ -18,7 +18,7 @@ from scipy.optimize import minimize
 from excite_cli.constraints.base import Array
 from excite_cli.criteria.base import Criterion
 from excite_cli.dynamics.forward_kinematics import States
-from excite_cli.excitation.correction import (
+from excite_cli.excitation.base_motion import (
     Mask,
     chosen_rows,
     corrected,

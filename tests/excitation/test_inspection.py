@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.excitation.admissible import Path as MotionPath

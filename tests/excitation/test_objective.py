@@ -41,7 +41,7 @@ from excite_cli.excitation.gradient_check import (
 )
 from excite_cli.excitation.objective import Objective
 from excite_cli.excitation.problem import Problem
-from excite_cli.excitation.progress import Measure
+from excite_cli.excitation.progress import ProgressMeasure
 from excite_cli.excitation.run import new_result
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import build_weighting
@@ -424,7 +424,7 @@ def test_the_envelope_gradient_is_exact(kinds: list[str], floating: bool) -> Non
         assert np.linalg.norm(gradient) > 0
         assert np.all(np.diff(spectrum.sigma) <= 0)
         assert _error(objective, criterion, alpha, (3e-5, 1e-5, 3e-6)) < 1e-7
-    assert spectrum.figure.measure is Measure.DIVERGENCE
+    assert spectrum.figure.measure is ProgressMeasure.DIVERGENCE
     factor = objective.stack.factor  # the earlier data alone
     expected = divergences(factor.T @ factor, objective.separation.directions)
     assert np.allclose(np.sort(0.5 * objective.earlier() ** 2), np.sort(expected))

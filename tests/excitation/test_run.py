@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from excite_cli.api.planning import plan, plan_answer
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.regressor import Regressor
 from excite_cli.errors import ConfigError

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.constraints.base import Array
-from excite_cli.excitation.correction import (
+from excite_cli.excitation.base_motion import (
     chosen_rows,
     corrected,
     dips,
@@ -19,7 +19,7 @@ from excite_cli.excitation.correction import (
 )
 from excite_cli.excitation.motion import Outcome
 from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.excitation.progress import Measure, Progress, Status
+from excite_cli.excitation.progress import Progress, ProgressMeasure, Status
 from excite_cli.excitation.residuals import REACH
 from excite_cli.excitation.solvers.base import Effort, Solver
 from excite_cli.excitation.solvers.interior_point import InteriorPoint, damped_update
@@ -85,7 +85,7 @@ def test_max_iterations_and_progress(problem: Problem, make: Callable[[], Solver
     assert outcome.status is Status.ITERATION_LIMIT
     assert [progress.iteration for progress in seen] == [1, 2, 3, 4, 5]
     assert all(1 <= progress.stage.number <= progress.stage.total for progress in seen)
-    assert {progress.figure.measure for progress in seen} == {Measure.CONDITION_NUMBER}
+    assert {progress.figure.measure for progress in seen} == {ProgressMeasure.CONDITION_NUMBER}
     again, _ = solved(MotionTask(problem), make(), iterations=5)
     np.testing.assert_array_equal(outcome.x, again.x)
 

@@ -3,7 +3,7 @@ import pytest
 import yaml
 
 from excite_cli.config.data_spec import EffectSpec, IdentificationSpec
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.export.parameters import effect_specs, parameters_yaml

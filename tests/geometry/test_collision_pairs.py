@@ -16,10 +16,10 @@ from excite_cli.geometry.collision_pairs import (
     stored_reasons,
 )
 from excite_cli.geometry.reasons import (
+    ContactMeaning,
     DroppedPair,
     LinksApart,
     Reason,
-    Standing,
     Why,
     dropped_in_words,
     reason_in_words,
@@ -173,4 +173,4 @@ def test_what_is_stored_comes_back(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert stored_reasons("key", 3) is None
     assert stored_reasons("other", len(reasons)) is None
     assert {reason.why for reason, _ in TOLD} == set(Why), "every reason has words"
-    assert [bool(standing_in_words(each)) for each in Standing] == [False, True, True, True]
+    assert [bool(standing_in_words(each)) for each in ContactMeaning] == [False, True, True, True]

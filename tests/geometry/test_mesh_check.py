@@ -10,7 +10,7 @@ from excite_cli.geometry.hull_bounds import ball_bounds, hull_bounds
 from excite_cli.geometry.link_meshes import Poses, link_meshes
 from excite_cli.geometry.mesh_check import MeshCheck
 from excite_cli.geometry.mesh_distances import MeshDistances
-from excite_cli.geometry.reasons import Standing
+from excite_cli.geometry.reasons import ContactMeaning
 from excite_cli.geometry.relative_reach import RelativeReach
 from excite_cli.robot.model import Array, Robot, build_robot
 from tests.geometry.mesh_cover import uncovered_links
@@ -176,7 +176,7 @@ def test_pairs_that_are_not_judged() -> None:
     assert always == {
         frozenset((f"arm_{side}_5_link", f"arm_{side}_7_link")) for side in ("left", "right")
     }
-    assert all(pair.standing is Standing.ALWAYS_TOUCHING for pair in check.always)
+    assert all(pair.standing is ContactMeaning.ALWAYS_TOUCHING for pair in check.always)
     names = {frozenset(check.names(pair)) for pair in check.pairs}
     assert frozenset(("arm_left_5_link", "torso_2_link")) not in names  # ignored
     assert frozenset(("arm_left_5_link", "arm_left_4_link")) not in names  # adjacent
@@ -192,12 +192,12 @@ def test_contact_of_links_by_hand_and_at_the_posture_is_told_only() -> None:
     check = MeshCheck(robot, by_hand=["tool"])
     told = [gap for gap in check.least(q).near if "tool" in (gap.first, gap.second)]
     assert told[0].touching > 0
-    assert all(gap.standing is Standing.BY_HAND and not gap.broken for gap in told)
+    assert all(gap.standing is ContactMeaning.BY_HAND and not gap.broken for gap in told)
     judge = MeshCheck(robot)
     touching = next(at for at in q if judge.least(at[None]).broken)
     posture = dict(zip(robot.joint_names, map(float, touching), strict=True))
     there = MeshCheck(build_robot(RobotSpec(urdf=str(ARM), posture=posture)))
-    assert any(pair.standing is Standing.AT_POSTURE for pair in there.pairs)
+    assert any(pair.standing is ContactMeaning.AT_POSTURE for pair in there.pairs)
     assert not there.least(touching[None]).broken
 
 

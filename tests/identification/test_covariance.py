@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from excite_cli.identification.covariance import Rows, noise_of
+from excite_cli.identification.covariance import RunRows, noise_of
 from excite_cli.identification.factors import run_factors, solve, stacked
 from excite_cli.identification.least_squares import LinearFit, fit_rows
 
 JOINTS, COLUMNS, SAMPLES = 3, 6, 1000
 
 
-def slow_rows(rng: np.random.Generator, x: np.ndarray, memory: float) -> Rows:
+def slow_rows(rng: np.random.Generator, x: np.ndarray, memory: float) -> RunRows:
     t = np.arange(SAMPLES) * 0.02
     frequency = rng.uniform(0.05, 0.5, (JOINTS, COLUMNS))
     phase = rng.uniform(0, 6.28, (JOINTS, COLUMNS))
@@ -20,10 +20,10 @@ def slow_rows(rng: np.random.Generator, x: np.ndarray, memory: float) -> Rows:
     white = rng.normal(size=(SAMPLES, JOINTS)) @ mixing.T
     tau = columns @ x + lfilter([1.0], [1.0, -memory], white, axis=0)
     usable = rng.random(tau.shape) > 0.002
-    return Rows(columns, tau, usable)
+    return RunRows(columns, tau, usable)
 
 
-def naive(runs: list[Rows], fit: LinearFit) -> np.ndarray:
+def naive(runs: list[RunRows], fit: LinearFit) -> np.ndarray:
     factors = [run_factors(run.columns, run.tau, run.usable) for run in runs]
     return np.sqrt(np.diag(solve(stacked(factors, fit.noise)).inverse))
 
@@ -85,7 +85,7 @@ def test_the_noise_of_a_known_process_is_found() -> None:
 
 def test_a_random_walk_and_a_hum_are_in_the_deviations() -> None:
     walk = np.cumsum(np.random.default_rng(2).normal(size=(800, 1)), axis=0)
-    rows = Rows(np.ones((800, 1, 1)), walk, np.ones((800, 1), bool))
+    rows = RunRows(np.ones((800, 1, 1)), walk, np.ones((800, 1), bool))
     fit = fit_rows([rows])
     assert np.isfinite(fit.covariance).all()
     assert fit.samples < 40
@@ -97,7 +97,7 @@ def test_a_random_walk_and_a_hum_are_in_the_deviations() -> None:
     assert 0.92 <= np.mean(inside) <= 0.99
 
 
-def hummed(rng: np.random.Generator) -> Rows:
+def hummed(rng: np.random.Generator) -> RunRows:
     """Friction of one joint: speed and its sign, ten seconds, beside a tone of 0.5 to 4 Hz."""
     t = np.arange(200) * 0.05
     speed = sum(
@@ -107,7 +107,7 @@ def hummed(rng: np.random.Generator) -> Rows:
     tone = np.sqrt(2) * np.sin(2 * np.pi * rng.uniform(0.5, 4.0) * t + rng.uniform(0, 6.28))
     tau = tone + 0.1 * rng.normal(size=len(t))
     columns = np.stack([speed, np.sign(speed)], axis=1)[:, None]
-    return Rows(columns, tau[:, None], (np.abs(speed) > 0.05)[:, None])
+    return RunRows(columns, tau[:, None], (np.abs(speed) > 0.05)[:, None])
 
 
 def test_long_runs_are_taken_in_stretches(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from excite_cli.config.data_spec import FilterSpec
-from excite_cli.config.load import parsed_spec
+from excite_cli.config.load_spec import parsed_spec
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import ConfigError
 from excite_cli.identification.declared_states import LeftOut, check_states, declared_sets

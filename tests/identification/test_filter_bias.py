@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from excite_cli.config.data_spec import FilterSpec
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters

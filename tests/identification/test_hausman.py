@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from excite_cli.identification.covariance import Rows
+from excite_cli.identification.covariance import RunRows
 from excite_cli.identification.hausman import hausman_test, instrument_dataset
 from excite_cli.measurement.dataset import Dataset, Run
 
@@ -21,7 +21,7 @@ def p_value(seed: int, feedback: float) -> float:
     columns = clean + 0.05 * rng.normal(size=clean.shape)
     columns[:, :, 0] += feedback * torque_noise
     tau = columns @ np.ones(COLUMNS) + torque_noise
-    rows = Rows(columns, tau, np.ones(tau.shape, bool))
+    rows = RunRows(columns, tau, np.ones(tau.shape, bool))
     return hausman_test([rows], [clean], "reference", np.ones(JOINTS)).p_value
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.effects.catalogue import declared_effects

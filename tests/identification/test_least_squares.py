@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from excite_cli.identification.covariance import Rows
+from excite_cli.identification.covariance import RunRows
 from excite_cli.identification.factors import run_factors, solve, stacked, together
 from excite_cli.identification.least_squares import fit_rows
 from excite_cli.robot.model import Array
@@ -9,12 +9,12 @@ from excite_cli.robot.model import Array
 X = np.array([2.0, -1.0, 0.5, 3.0])
 
 
-def random_rows(seed: int, noise: Array, samples: int = 300, dropped: float = 0.1) -> Rows:
+def random_rows(seed: int, noise: Array, samples: int = 300, dropped: float = 0.1) -> RunRows:
     rng = np.random.default_rng(seed)
     columns = rng.normal(size=(samples, len(noise), len(X))) * [1.0, 100.0, 0.01, 1.0]
     tau = columns @ X + rng.normal(size=(samples, len(noise))) * noise
     usable = rng.random(tau.shape) > dropped
-    return Rows(columns, np.where(usable, tau, np.nan), usable)
+    return RunRows(columns, np.where(usable, tau, np.nan), usable)
 
 
 def test_weighting_by_noise_beats_equal_weights() -> None:
@@ -30,7 +30,7 @@ def test_weighting_by_noise_beats_equal_weights() -> None:
 def test_outliers_hardly_move_the_robust_fit() -> None:
     rows = random_rows(3, np.array([1.0, 1.0]), 600)
     bad = np.random.default_rng(0).random(rows.tau.shape) < 0.05
-    spoiled = Rows(rows.columns, rows.tau + np.where(bad, 200.0, 0.0), rows.usable)
+    spoiled = RunRows(rows.columns, rows.tau + np.where(bad, 200.0, 0.0), rows.usable)
     scale = np.array([1, 100, 0.01, 1])
     plain = np.linalg.norm((fit_rows([spoiled], "wls").x - X) * scale)
     robust = np.linalg.norm((fit_rows([spoiled], "irls").x - X) * scale)
@@ -43,7 +43,7 @@ def test_what_no_sample_shows_is_said_and_does_no_harm() -> None:
     rows = random_rows(1, np.array([0.001, 0.001]))
     twin = rows.columns[:, :, :1]
     columns = np.concatenate([rows.columns, -3 * twin, np.zeros_like(twin)], axis=2)
-    fit = fit_rows([Rows(columns, rows.tau, rows.usable)])
+    fit = fit_rows([RunRows(columns, rows.tau, rows.usable)])
     assert list(fit.seen) == [False, True, True, True, False, False]
     assert np.isinf(np.diag(fit.covariance)[~fit.seen]).all()
     assert fit.x[1:4] == pytest.approx(X[1:], rel=0.02)
@@ -56,7 +56,7 @@ def test_a_prior_decides_where_data_are_silent_and_nowhere_else() -> None:
     columns = np.concatenate([rows.columns, np.zeros((*rows.tau.shape, 1))], axis=2)
     prior = np.eye(5) / 2.0, np.array([0.0, 0.0, 0.0, 0.0, 7.0]) / 2.0
     for method in ("ols", "wls", "irls"):
-        fit = fit_rows([Rows(columns, rows.tau, rows.usable)], method, prior)
+        fit = fit_rows([RunRows(columns, rows.tau, rows.usable)], method, prior)
         assert fit.x[4] == pytest.approx(7.0)
         assert np.sqrt(fit.covariance[4, 4]) == pytest.approx(2.0)
         assert fit.x[:2] == pytest.approx(X[:2], abs=0.05)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.identification.identify import Identification, identify
 from excite_cli.identification.link_changes import inertial_covariance, link_changes

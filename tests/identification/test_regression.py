@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from excite_cli.base_link.rows import with_base
+from excite_cli.base_link.wrench_rows import with_base
 from excite_cli.config.data_spec import FilterSpec, MeasurementSpec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.regressor import standard_parameters

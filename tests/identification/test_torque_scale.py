@@ -12,7 +12,7 @@ from excite_cli.config.data_spec import (
     MeasurementSpec,
     TotalMassSpec,
 )
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.diagnosis.verdict import HeldOutVerdict

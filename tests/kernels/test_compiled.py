@@ -16,7 +16,7 @@ from excite_cli.dynamics.forward_kinematics import BatchKinematics
 from excite_cli.dynamics.regressor import Regressor
 from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint
 from excite_cli.excitation import residuals
-from excite_cli.excitation.residuals import Rows, squared_per_instant
+from excite_cli.excitation.residuals import ResidualDerivatives, squared_per_instant
 from excite_cli.geometry import pair_distances
 from excite_cli.geometry.pair_distances import PairDistances
 from excite_cli.geometry.pair_table import PairTable
@@ -134,7 +134,7 @@ def test_squares_per_instant(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(0)
     times = np.sort(rng.integers(0, 6, 40))
     parts = (rng.normal(size=(40, 3)), None, rng.normal(size=(40, 3)))
-    rows, weights = Rows(times, np.zeros(40, int), parts), rng.uniform(size=40)
+    rows, weights = ResidualDerivatives(times, np.zeros(40, int), parts), rng.uniform(size=40)
     compiled = squared_per_instant(rows, weights, 8)
     monkeypatch.setattr(residuals, "KERNELS", None)
     plain = squared_per_instant(rows, weights, 8)

@@ -12,12 +12,12 @@ from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import FileError
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Dataset, Finding, Run
-from excite_cli.measurement.limits import Limits
 from excite_cli.measurement.quality import checked
+from excite_cli.measurement.recording_limits import RecordingLimits
 
 JOINTS = ("shoulder", "elbow", "wrist")
 BOUNDS = (np.full(3, -3.0), np.full(3, 3.0), np.full(3, 4.0), np.full(3, 50.0))
-LIMITS = Limits(*BOUNDS, np.ones(3, bool))
+LIMITS = RecordingLimits(*BOUNDS, np.ones(3, bool))
 
 
 def motion(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from excite_cli.config.data_spec import MeasurementSpec
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.config.robot_spec import TransmissionSpec
 from excite_cli.errors import ConfigError
 from excite_cli.measurement.catalogue import read_dataset

@@ -10,8 +10,8 @@ import pytest
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Run, joined, merged
-from excite_cli.measurement.limits import Limits
 from excite_cli.measurement.quality import mask_saturated, raise_for_errors, sentence, unwrapped
+from excite_cli.measurement.recording_limits import RecordingLimits
 from excite_cli.measurement.resolution import lattice_step
 from excite_cli.measurement.speed_lag import speed_lag
 from excite_cli.measurement.torque import angle_units
@@ -343,7 +343,7 @@ WRAPPED = (TRUE + np.pi) % (2 * np.pi) - np.pi
 def continuous(q: Array, lower: float = -9.0, upper: float = 9.0) -> tuple[Array, list[Finding]]:
     ends, fast = (np.array([lower]), np.array([upper])), np.full(1, 9.0)
     run = Run("a", T, q[:, None], np.zeros((len(T), 1)))
-    (found,), told = unwrapped([run], ("j",), Limits(*ends, fast, fast, np.ones(1, bool)))
+    (found,), told = unwrapped([run], ("j",), RecordingLimits(*ends, fast, fast, np.ones(1, bool)))
     return found.q[:, 0], told
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.constraints.base import Constraint
 from excite_cli.excitation.admissible import lacking_margins, path_of, verdicts
 from excite_cli.excitation.problem import Problem, build_problem

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.errors import RobotError
 from excite_cli.geometry.reasons import Why
 from excite_cli.proposal.propose import Proposal, Request, propose

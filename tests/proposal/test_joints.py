@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from excite_cli.errors import ConfigError, RobotError
-from excite_cli.proposal.joints import Choice, choose_joints
+from excite_cli.proposal.joints import JointChoice, choose_joints
 from excite_cli.proposal.propose import Request, propose
 from excite_cli.robot.description import EXAMPLE_PREFIX, load_description
 from excite_cli.robot.urdf_joints import survey
@@ -14,7 +14,7 @@ from tests.proposal.robots import GOOD, joint, link, serial, surveyed, written
 TINY = 'lower="-0.0005" upper="0.001" velocity="1" effort="10"'
 
 
-def chosen(name: str, asked: tuple[str, ...] = ()) -> Choice:
+def chosen(name: str, asked: tuple[str, ...] = ()) -> JointChoice:
     return choose_joints(survey(load_description(EXAMPLE_PREFIX + name)).joints, name, asked)
 
 

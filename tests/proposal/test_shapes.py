@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.excitation.problem import build_problem
 from excite_cli.proposal.propose import Request, propose

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 from threadpoolctl import threadpool_limits
 
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.excitation.problem import build_problem
 from excite_cli.excitation.random_baseline import RandomMotion
 from excite_cli.excitation.run import continue_run, new_result

@@ -7,16 +7,25 @@ import numpy as np
 import pytest
 
 from excite_cli.api.loading import load_problem
-from excite_cli.config.load import parse_spec, spec_as_yaml
+from excite_cli.config.load_spec import parse_spec, spec_as_yaml
 from excite_cli.criteria.base import singular_values
 from excite_cli.excitation.stack import Stack
 from excite_cli.report.assembly import Source, campaign_figures, page_of
-from excite_cli.report.campaign import Campaign, in_figures
+from excite_cli.report.campaign import RebuiltResult, in_figures
 from excite_cli.report.compare_section import comparable, compare_results, differences
 from excite_cli.report.condition_section import condition_chart, condition_section
 from excite_cli.report.margin_section import margin_figures, margin_section
 from excite_cli.report.motion_section import drawn_motions, motion_section
-from excite_cli.report.page import Block, Charts, Choice, Page, Section, Table, Text, render
+from excite_cli.report.page import (
+    Block,
+    Charts,
+    ChoiceBlock,
+    Page,
+    PageSection,
+    TableBlock,
+    Text,
+    render,
+)
 from excite_cli.report.plot import Plot
 from excite_cli.report.weakest_section import weakest_section
 from tests.report.case import Case
@@ -26,21 +35,21 @@ SMOKE = Path(__file__).parents[2] / "configs" / "smoke.yaml"
 
 
 @pytest.fixture
-def campaign(case: Case) -> Campaign:
+def campaign(case: Case) -> RebuiltResult:
     problem, result = case
-    return Campaign("smoke", result, problem)
+    return RebuiltResult("smoke", result, problem)
 
 
 def _of(kind: type, blocks: tuple[Block, ...]) -> list[Block]:
     return [block for block in blocks if isinstance(block, kind)]
 
 
-def _table(section: Section, title: str) -> Table:
-    (found,) = (b for b in section.blocks if isinstance(b, Table) and title in b.title)
+def _table(section: PageSection, title: str) -> TableBlock:
+    (found,) = (b for b in section.blocks if isinstance(b, TableBlock) and title in b.title)
     return found
 
 
-def _said(section: Section) -> str:
+def _said(section: PageSection) -> str:
     return Structure(render(Page("t", "s", (), (section,)))).text
 
 
@@ -63,7 +72,7 @@ def test_numbers_as_people_write_them(value: float, text: str) -> None:
     assert in_figures(value) == text
 
 
-def test_condition_numbers_beside_random_ones(campaign: Campaign) -> None:
+def test_condition_numbers_beside_random_ones(campaign: RebuiltResult) -> None:
     result, section = campaign.result, condition_section(campaign)
     reached, random = (
         found[-1].stacked_condition_number for found in (result.motions, result.random)
@@ -88,7 +97,7 @@ def test_condition_numbers_beside_random_ones(campaign: Campaign) -> None:
     assert _of(Text, section.blocks) == []
 
 
-def test_without_random_motions_it_says_how_to_get_them(campaign: Campaign) -> None:
+def test_without_random_motions_it_says_how_to_get_them(campaign: RebuiltResult) -> None:
     alone = replace(campaign, result=replace(campaign.result, random=()))
     section = condition_section(alone)
     assert "excite compare-random" in _said(section)
@@ -96,7 +105,7 @@ def test_without_random_motions_it_says_how_to_get_them(campaign: Campaign) -> N
     assert len(_table(section, "Motions").columns) == 6
 
 
-def test_indices_with_gaps_have_their_own_places(campaign: Campaign) -> None:
+def test_indices_with_gaps_have_their_own_places(campaign: RebuiltResult) -> None:
     (one, two) = campaign.result.random
     gaps = replace(campaign.result, random=(replace(one, index=1), replace(two, index=7)))
     plot = condition_chart(gaps)
@@ -105,25 +114,25 @@ def test_indices_with_gaps_have_their_own_places(campaign: Campaign) -> None:
     assert np.isfinite(stacked.y).all()
 
 
-def test_a_condition_number_that_is_not_finite(campaign: Campaign) -> None:
+def test_a_condition_number_that_is_not_finite(campaign: RebuiltResult) -> None:
     motion = replace(campaign.result.motions[0], condition_number=float("inf"))
     result = replace(campaign.result, motions=(motion,), random=())
     section = condition_section(replace(campaign, result=result))
     assert _table(section, "Motions").rows[0][1] == "∞"
 
 
-def test_a_card_for_every_joint_and_a_choice_of_motions(campaign: Campaign) -> None:
+def test_a_card_for_every_joint_and_a_choice_of_motions(campaign: RebuiltResult) -> None:
     motion = campaign.result.motions[0]
     two = replace(campaign.result, motions=(motion, replace(motion, index=2)))
     section = motion_section(replace(campaign, result=two))
-    (choice,) = _of(Choice, section.blocks)
-    assert isinstance(choice, Choice)
+    (choice,) = _of(ChoiceBlock, section.blocks)
+    assert isinstance(choice, ChoiceBlock)
     assert [text for text, _ in choice.options] == ["motion 1", "motion 2"]
     cards = choice.options[0][1][0]
     assert isinstance(cards, Charts)
     assert [chart.title for chart in cards.charts] == list(campaign.problem.robot.joint_names)
     peaks = choice.options[0][1][1]
-    assert isinstance(peaks, Table)
+    assert isinstance(peaks, TableBlock)
     q, v, _ = campaign.problem.trajectory.basis(np.linspace(0, 6, 400)).states(motion.coefficients)
     limits = campaign.problem.robot.limits.velocity
     for joint, row in enumerate(peaks.rows):
@@ -133,14 +142,14 @@ def test_a_card_for_every_joint_and_a_choice_of_motions(campaign: Campaign) -> N
     assert peaks.rows[4][1].endswith(" m")
 
 
-def test_many_motions_are_not_all_drawn(campaign: Campaign) -> None:
+def test_many_motions_are_not_all_drawn(campaign: RebuiltResult) -> None:
     motions = tuple(replace(campaign.result.motions[0], index=k) for k in range(1, 51))
     assert len(drawn_motions(motions, 30)) == 4
     assert len(drawn_motions(motions, 400)) == 1
     assert drawn_motions(motions[:3], 30) == motions[:3]
 
 
-def test_margins_name_the_worst_and_the_verdict(campaign: Campaign) -> None:
+def test_margins_name_the_worst_and_the_verdict(campaign: RebuiltResult) -> None:
     motion = campaign.result.motions[0]
     assert all(motion.certified.values())
     section = margin_section(campaign)
@@ -155,8 +164,8 @@ def test_margins_name_the_worst_and_the_verdict(campaign: Campaign) -> None:
         f"{worst.time:.3f}",
         "proved",
     )
-    (choice,) = _of(Choice, section.blocks)
-    assert isinstance(choice, Choice)
+    (choice,) = _of(ChoiceBlock, section.blocks)
+    assert isinstance(choice, ChoiceBlock)
     charts = choice.options[0][1][0]
     assert isinstance(charts, Charts)
     assert len(charts.charts) == len(campaign.problem.constraints)
@@ -188,7 +197,7 @@ def test_margins_name_the_worst_and_the_verdict(campaign: Campaign) -> None:
     ],
 )
 def test_what_is_not_proved_is_not_said_to_be(
-    campaign: Campaign,
+    campaign: RebuiltResult,
     certified: dict[str, bool],
     violations: int,
     words: str,
@@ -208,7 +217,7 @@ def test_what_is_not_proved_is_not_said_to_be(
     assert value in figure.value
 
 
-def test_the_weakest_direction_is_that_of_the_stack(campaign: Campaign) -> None:
+def test_the_weakest_direction_is_that_of_the_stack(campaign: RebuiltResult) -> None:
     rank = campaign.problem.base.rank
     sizes = np.full(rank, 10.0)
     sizes[3] = 0.5
@@ -223,25 +232,25 @@ def test_the_weakest_direction_is_that_of_the_stack(campaign: Campaign) -> None:
     assert all(row[3] == "0.100" for key, row in rows.items() if key != name)
 
 
-def test_a_singular_stack_is_told(campaign: Campaign) -> None:
+def test_a_singular_stack_is_told(campaign: RebuiltResult) -> None:
     stack = Stack(np.diag([1.0, *np.zeros(campaign.problem.base.rank - 1)]), 1)
     section = weakest_section(replace(campaign, result=replace(campaign.result, stack=stack)))
     assert "does not show at all" in section.lead
 
 
-def test_configs_that_differ_are_told_key_by_key(campaign: Campaign) -> None:
+def test_configs_that_differ_are_told_key_by_key(campaign: RebuiltResult) -> None:
     config = campaign.result.config
     spec = parse_spec(config)
     torque = {"constraints.torque.scale": 0.5, "seed": 7}
     changed = parse_spec(config, overrides=[f"{key}={value}" for key, value in torque.items()])
     table = differences(("a", "b"), (spec_as_yaml(spec), spec_as_yaml(changed)))
-    assert isinstance(table, Table)
+    assert isinstance(table, TableBlock)
     assert set(table.rows) == {("constraints.torque.scale", "0.9", "0.5"), ("seed", "1", "7")}
     same = differences(("a", "b"), (config, config))
     assert isinstance(same, Text)
 
 
-def test_results_side_by_side(campaign: Campaign) -> None:
+def test_results_side_by_side(campaign: RebuiltResult) -> None:
     slow = replace(campaign.result.motions[0], stacked_condition_number=99.0)
     other = replace(
         campaign, name="other", number=2, alone=False,
@@ -253,7 +262,7 @@ def test_results_side_by_side(campaign: Campaign) -> None:
     assert len(_of(Charts, section.blocks)) == 1
 
 
-def test_other_weights_are_not_compared(campaign: Campaign) -> None:
+def test_other_weights_are_not_compared(campaign: RebuiltResult) -> None:
     other = replace(campaign.result, row_weights=2 * campaign.result.row_weights)
     both = [campaign, replace(campaign, result=other)]
     assert comparable([campaign, campaign])
@@ -286,7 +295,7 @@ def test_the_spectrum_of_random_motions_stands_on_the_prior(case: Case) -> None:
     assert sigma[-1] >= 1e3
 
 
-def test_weights_and_scales_are_said(campaign: Campaign) -> None:
+def test_weights_and_scales_are_said(campaign: RebuiltResult) -> None:
     assert "Of the regressor" not in condition_section(campaign).lead
     weighting = replace(campaign.problem.weighting, row_name="effort", column_name="unit_norm")
     problem = replace(campaign.problem, weighting=weighting)
@@ -295,10 +304,10 @@ def test_weights_and_scales_are_said(campaign: Campaign) -> None:
     assert section.lead.endswith(words)
 
 
-def test_without_limits_cards_speak_of_peaks(campaign: Campaign) -> None:
+def test_without_limits_cards_speak_of_peaks(campaign: RebuiltResult) -> None:
     free = replace(campaign, problem=replace(campaign.problem, constraints=()))
-    (choice,) = _of(Choice, motion_section(free).blocks)
-    assert isinstance(choice, Choice)
+    (choice,) = _of(ChoiceBlock, motion_section(free).blocks)
+    assert isinstance(choice, ChoiceBlock)
     cards = choice.options[0][1][0]
     assert isinstance(cards, Charts)
     assert isinstance(cards.charts[0], Plot)
@@ -308,7 +317,7 @@ def test_without_limits_cards_speak_of_peaks(campaign: Campaign) -> None:
     assert margin_figures(free) == ()
 
 
-def test_the_margins_say_of_which_pairs_they_speak(campaign: Campaign) -> None:
+def test_the_margins_say_of_which_pairs_they_speak(campaign: RebuiltResult) -> None:
     assert "all 7 relevant" in _said(margin_section(campaign))
     config = "constraints.self_collision.ignore=[[base, wrist]]"
     problem = load_problem(SMOKE, [config])

@@ -9,8 +9,8 @@ import pytest
 
 from excite_cli.diagnosis.covariate import Aspect, Covariate
 from excite_cli.diagnosis.records import (
-    Absorbed,
     Approximation,
+    ConfoundedCandidate,
     Diagnosis,
     EffectRecord,
     JointAlias,
@@ -31,11 +31,11 @@ from excite_cli.report.effect_section import effect_section
 from excite_cli.report.page import (
     Block,
     Charts,
-    Choice,
+    ChoiceBlock,
     Fold,
     Page,
-    Section,
-    Table,
+    PageSection,
+    TableBlock,
     Text,
     render,
 )
@@ -56,18 +56,18 @@ def diagnosis(plain: Diagnosis) -> Diagnosis:
     traces, held_out = make_traces(plain.joint_names)
     traces = replace(traces, runs=traces.runs[:1])
     rest = replace(
-        plain.large_rests[0], depends_on=(Covariate("position", "elbow", Aspect.HISTORY),)
+        plain.excess_residuals[0], depends_on=(Covariate("position", "elbow", Aspect.HISTORY),)
     )
-    return replace(plain, traces=traces, held_out_traces=held_out, large_rests=(rest,))
+    return replace(plain, traces=traces, held_out_traces=held_out, excess_residuals=(rest,))
 
 
 @pytest.fixture(scope="module")
-def every(diagnosis: Diagnosis) -> tuple[Section, ...]:
+def every(diagnosis: Diagnosis) -> tuple[PageSection, ...]:
     return diagnosis_sections(diagnosis)
 
 
 @pytest.fixture(scope="module")
-def sections(every: tuple[Section, ...]) -> dict[str, Section]:
+def sections(every: tuple[PageSection, ...]) -> dict[str, PageSection]:
     return {each.anchor: each for each in every}
 
 
@@ -79,12 +79,12 @@ def blocks_of(blocks: tuple[Block, ...]) -> Iterator[Block]:
             yield from block.charts
         elif isinstance(block, Fold):
             yield from blocks_of(block.blocks)
-        elif isinstance(block, Choice):
+        elif isinstance(block, ChoiceBlock):
             for _, inner in block.options:
                 yield from blocks_of(inner)
 
 
-def charts_of(section: Section) -> list[Chart | Plot]:
+def charts_of(section: PageSection) -> list[Chart | Plot]:
     return [block for block in blocks_of(section.blocks) if isinstance(block, Chart | Plot)]
 
 
@@ -115,7 +115,7 @@ def small(diagnosis: Diagnosis, part: float) -> Diagnosis:
 
 
 def test_all_parts_are_there_and_the_page_is_sound(
-    diagnosis: Diagnosis, every: tuple[Section, ...]
+    diagnosis: Diagnosis, every: tuple[PageSection, ...]
 ) -> None:
     page = Page("d", "", diagnosis_figures(diagnosis), every)
     structure = Structure(render(page))
@@ -132,7 +132,7 @@ def test_all_parts_are_there_and_the_page_is_sound(
 
 
 def test_every_chart_says_its_finding_in_figures_and_labels_its_axes(
-    sections: dict[str, Section],
+    sections: dict[str, PageSection],
 ) -> None:
     charts = [chart for section in sections.values() for chart in charts_of(section)]
     assert len(charts) > 5
@@ -142,7 +142,7 @@ def test_every_chart_says_its_finding_in_figures_and_labels_its_axes(
             assert re.search(r"\[[^\]]+\]", drawn(chart)), chart.title
 
 
-def test_evidence_shows_the_law_and_its_figures(sections: dict[str, Section]) -> None:
+def test_evidence_shows_the_law_and_its_figures(sections: dict[str, PageSection]) -> None:
     (chart,) = charts_of(sections["diagnosis-evidence"])
     assert chart.title == "Viscous friction: elbow"
     assert "2.00 ± 0.10 N·m·s/rad" in chart.caption
@@ -186,9 +186,9 @@ def test_evidence_tells_of_another_name_of_the_same_torque(
     assert "no motion distinguishes them" in told
 
 
-def test_residuals_tell_held_out_from_training(sections: dict[str, Section]) -> None:
+def test_residuals_tell_held_out_from_training(sections: dict[str, PageSection]) -> None:
     (choice,) = sections["diagnosis-time"].blocks
-    assert isinstance(choice, Choice)
+    assert isinstance(choice, ChoiceBlock)
     labels = [label for label, _ in choice.options]
     assert labels == ["run_3 (held out: took no part in the fit)", "run_1"]
     elbow = next(c for c in charts_of(sections["diagnosis-time"]) if c.title == "elbow")
@@ -213,7 +213,7 @@ def test_held_out_blocks_of_a_run_are_shaded(diagnosis: Diagnosis) -> None:
     assert chart.panels[0].axis == "force [N]"
 
 
-def test_what_depends_is_told_drawn_and_mapped(sections: dict[str, Section]) -> None:
+def test_what_depends_is_told_drawn_and_mapped(sections: dict[str, PageSection]) -> None:
     section = sections["diagnosis-unexplained"]
     told = [b.text for b in section.blocks if isinstance(b, Text)]
     assert any("60% of its energy is predictable, best from history of angle" in x for x in told)
@@ -231,7 +231,7 @@ def test_without_dependences_there_is_no_map(diagnosis: Diagnosis) -> None:
     )
     calm = replace(
         diagnosis,
-        large_rests=(),
+        excess_residuals=(),
         traces=replace(diagnosis.traces, dependence=dependence),
     )
     section = dependence_section(calm)
@@ -246,15 +246,15 @@ def test_effects_that_carry_less_than_a_hundredth_of_the_fall_are_folded(
     diagnosis: Diagnosis, part: float, folded: bool
 ) -> None:
     found = found_section(small(diagnosis, part))
-    tables = [block for block in found.blocks if isinstance(block, Table)]
+    tables = [block for block in found.blocks if isinstance(block, TableBlock)]
     spring = next(t for t in tables if any(row[0] == "spring at the joint" for row in t.rows))
     assert spring.folded == folded
 
 
 def test_verdicts_on_held_out_data_stand_in_the_table_and_on_the_card(
-    diagnosis: Diagnosis, sections: dict[str, Section]
+    diagnosis: Diagnosis, sections: dict[str, PageSection]
 ) -> None:
-    table = next(b for b in sections["diagnosis-found"].blocks if isinstance(b, Table))
+    table = next(b for b in sections["diagnosis-found"].blocks if isinstance(b, TableBlock))
     assert table.rows[0][table.columns.index("held-out")] == "confirmed, 6.00 pp lower"
     (chart,) = charts_of(sections["diagnosis-evidence"])
     assert "Held-out error: confirmed, 6.00 pp lower." in chart.caption
@@ -264,7 +264,7 @@ def test_verdicts_on_held_out_data_stand_in_the_table_and_on_the_card(
 def test_what_was_weighed_and_what_would_settle_the_absorbed_is_told(diagnosis: Diagnosis) -> None:
     """The one or the other: what is weighed settles nothing more."""
     (named, *_) = diagnosis.effects
-    absorbed = (Absorbed("wrench_gain", ("elbow",), ("m[elbow]",), 0.0),)
+    absorbed = (ConfoundedCandidate("wrench_gain", ("elbow",), ("m[elbow]",), 0.0),)
     free = found_section(replace(diagnosis, absorbed=absorbed))
     weighed = replace(named, verdict=HeldOutVerdict.WEIGHED)
     told = found_section(replace(diagnosis, effects=(weighed,), absorbed=absorbed))
@@ -272,7 +272,7 @@ def test_what_was_weighed_and_what_would_settle_the_absorbed_is_told(diagnosis: 
         [
             block.note
             for block in each.blocks
-            if isinstance(block, Table)
+            if isinstance(block, TableBlock)
             if "Not identifiable" in block.title
         ]
         for each in (free, told)
@@ -298,7 +298,7 @@ def test_every_run_is_listed_with_its_use_and_what_is_there_alone(diagnosis: Dia
     (runs,) = (
         block
         for block in diagnosis_sections(found)[-1].blocks
-        if isinstance(block, Table) and block.title == "Runs"
+        if isinstance(block, TableBlock) and block.title == "Runs"
     )
     assert runs.rows == (
         ("a", "training", "–"),
@@ -309,12 +309,12 @@ def test_every_run_is_listed_with_its_use_and_what_is_there_alone(diagnosis: Dia
     (runs,) = (
         block
         for block in diagnosis_sections(replace(found, processing=parts))[-1].blocks
-        if isinstance(block, Table) and block.title == "Runs"
+        if isinstance(block, TableBlock) and block.title == "Runs"
     )
     assert [row[2] for row in runs.rows] == ["–", "viscous friction of elbow", "–"]
     single = replace(found, processing={**processing, "runs": ["a"]})
     blocks = diagnosis_sections(single)[-1].blocks
-    assert not any(isinstance(each, Table) and each.title == "Runs" for each in blocks)
+    assert not any(isinstance(each, TableBlock) and each.title == "Runs" for each in blocks)
 
 
 def test_a_held_out_error_that_did_not_fall_is_told_first(diagnosis: Diagnosis) -> None:
@@ -334,7 +334,7 @@ def test_a_held_out_error_that_did_not_fall_is_told_first(diagnosis: Diagnosis) 
 
 def test_nothing_found(diagnosis: Diagnosis) -> None:
     unnamed = replace(diagnosis, effects=())
-    nothing = replace(unnamed, large_rests=())
+    nothing = replace(unnamed, excess_residuals=())
     for each, begins in (
         (unnamed, "No effect of the catalogue explains"),
         (nothing, "Nothing is missing"),
@@ -354,7 +354,7 @@ def test_files_of_earlier_versions_get_sentences_and_names_are_escaped(plain: Di
     assert "<b>" not in render(Page("old", "", diagnosis_figures(odd), tuple(sections.values())))
 
 
-def test_joints_that_never_move_are_told_not_drawn(sections: dict[str, Section]) -> None:
+def test_joints_that_never_move_are_told_not_drawn(sections: dict[str, PageSection]) -> None:
     section = sections["diagnosis-errors"]
     assert [chart.title for chart in charts_of(section)] == ["RMS error of the torque, all samples"]
     assert any("No joint moves" in b.text for b in section.blocks if isinstance(b, Text))

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.criteria.base import singular_values
 from excite_cli.errors import MissingExtraError
 from excite_cli.excitation.admissible import fine_margins, fine_times

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.identification.identify import identify
@@ -19,7 +19,7 @@ from excite_cli.report.fit_sections import (
     parameter_section,
     time_section,
 )
-from excite_cli.report.page import Choice, Page, Table, Text, render
+from excite_cli.report.page import ChoiceBlock, Page, TableBlock, Text, render
 from excite_cli.store.fit_file import read_fit, write_fit
 from tests.identification.synthetic import measured
 from tests.report.structure import Structure
@@ -72,7 +72,9 @@ def test_an_unseen_parameter_has_no_end(stored: StoredFit) -> None:
     fit = replace(stored.fit, std=std, relative_std=std, covariance=covariance,
                   identifiable=np.isfinite(std))  # fmt: skip
     found = parameter_section(fit)
-    assert any("> 1000%" in row for b in found.blocks if isinstance(b, Table) for row in b.rows)
+    assert any(
+        "> 1000%" in row for b in found.blocks if isinstance(b, TableBlock) for row in b.rows
+    )
 
 
 def test_strong_correlations_are_listed(stored: StoredFit) -> None:
@@ -83,13 +85,13 @@ def test_strong_correlations_are_listed(stored: StoredFit) -> None:
     assert "No two parameters" in text.text
     covariance[0, 2] = covariance[2, 0] = -0.98 * std[0] * std[2]
     (table,) = correlated_parameters(replace(stored.fit, covariance=covariance))
-    assert isinstance(table, Table)
+    assert isinstance(table, TableBlock)
     assert table.rows == ((names[0], names[2], "-0.980"),)
 
 
 def test_runs_in_time_and_files_without(stored: StoredFit) -> None:
     (choice,) = time_section(stored).blocks
-    assert isinstance(choice, Choice)
+    assert isinstance(choice, ChoiceBlock)
     assert choice.options[0][0].startswith("r3 (held out")
     (text,) = time_section(replace(stored, traces=(), torque_units=())).blocks
     assert isinstance(text, Text)

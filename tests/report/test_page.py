@@ -9,12 +9,12 @@ from excite_cli.report.assembly import Source, page_of
 from excite_cli.report.chart import Chart
 from excite_cli.report.page import (
     Charts,
-    Choice,
+    ChoiceBlock,
     Fold,
     KeyFigure,
     Page,
-    Section,
-    Table,
+    PageSection,
+    TableBlock,
     Text,
     render,
 )
@@ -35,13 +35,13 @@ def _page(word: str) -> Page:
     chart = _chart(word)
     blocks = (
         Charts((chart, _chart(word)), word),
-        Choice(word, ((word, (chart,)), ("second", (Text(word),)))),
-        Table((word, "b"), ((word, "1"),), word, frozenset({1}), word, True),
-        Table(("a",), ((word,),), wordy=frozenset({0})),
+        ChoiceBlock(word, ((word, (chart,)), ("second", (Text(word),)))),
+        TableBlock((word, "b"), ((word, "1"),), word, frozenset({1}), word, True),
+        TableBlock(("a",), ((word,),), wordy=frozenset({0})),
         Fold(word, (Text(word, "code"), Text(word, "bad"))),
     )
-    section = Section("one", word, blocks, word)
-    return Page(word, word, (KeyFigure(word, word, word),), (section, Section("two", "B", ())))
+    section = PageSection("one", word, blocks, word)
+    return Page(word, word, (KeyFigure(word, word, word),), (section, PageSection("two", "B", ())))
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +104,7 @@ def test_hostile_names_stay_names() -> None:
 
 def test_commands_between_backticks_are_code() -> None:
     blocks = (Text("run `excite <check>` now"), Text("a ` alone"))
-    text = render(Page("t", "s", (), (Section("a", "A", blocks),)))
+    text = render(Page("t", "s", (), (PageSection("a", "A", blocks),)))
     assert "run <code>excite &lt;check&gt;</code> now" in text
     assert "a ` alone" in text
 

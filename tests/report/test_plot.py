@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from excite_cli.report.plot import Panel, Plot, Series, encoded, merged
+from excite_cli.report.plot import Curve, Panel, Plot, encoded, merged
 from excite_cli.robot.model import Array
 
 
@@ -44,7 +44,7 @@ def test_points_over_several_x_keep_their_places() -> None:
 
 
 def test_no_limit_is_told_as_none() -> None:
-    series = Series("a", np.array([1.0, 2.0]), "blue")
+    series = Curve("a", np.array([1.0, 2.0]), "blue")
     plot = Plot("t", "w", "time [s]", np.array([0.0, 1.0]), (Panel("y", (series,)),))
     (panel,) = json.loads(plot.data)["panels"]
     assert panel["limits"] == [None, None]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from excite_cli.report.diagnosis_figures import draw_plots
-from excite_cli.report.plot import Panel, Plot, Series, merged
+from excite_cli.report.plot import Curve, Panel, Plot, merged
 from excite_cli.report.style import VERMILION, WIDTH
 
 X = np.linspace(0.0, 4.0, 9)
@@ -17,8 +17,8 @@ def plot(*panels: Panel, title: str = "elbow") -> Plot:
 
 
 def two() -> Plot:
-    upper = Panel("torque [N·m]", (Series("model", BROKEN, "vermilion", "dashed"),), span=(-1, 20))
-    lower = Panel("left [N·m]", (Series("left", -X, "blue"),), limits=(-2.0, np.inf))
+    upper = Panel("torque [N·m]", (Curve("model", BROKEN, "vermilion", "dashed"),), span=(-1, 20))
+    lower = Panel("left [N·m]", (Curve("left", -X, "blue"),), limits=(-2.0, np.inf))
     return plot(upper, lower)
 
 
@@ -47,8 +47,8 @@ def test_points_of_others_do_not_break_a_line_and_whiskers_stand_at_their_own() 
     x, (line, marks) = merged((np.array([0.0, 2.0]), np.array([5.0, 6.0])),
                               (np.array([1.0, 3.0]), np.array([7.0, 8.0])))  # fmt: skip
     series = (
-        Series("law", line, "vermilion"),
-        Series("median", marks, "blue", "marks", low=marks - 1, high=marks + 2),
+        Curve("law", line, "vermilion"),
+        Curve("median", marks, "blue", "marks", low=marks - 1, high=marks + 2),
     )
     both = Plot("a", "b", "speed [rad/s]", x, (Panel("torque [N·m]", series),))
     (axes,) = draw_plots("title", [both], 1).axes
@@ -78,6 +78,6 @@ def test_one_legend_names_every_look_once_and_nothing_leaves_the_page() -> None:
 
 
 def test_a_logarithmic_axis_is_one() -> None:
-    panel = Panel("error [N·m]", (Series("rms", X + 1.0, "ink"),), logarithmic=True)
+    panel = Panel("error [N·m]", (Curve("rms", X + 1.0, "ink"),), logarithmic=True)
     (axes,) = draw_plots("title", [plot(panel)], 1).axes
     assert axes.get_yscale() == "log"

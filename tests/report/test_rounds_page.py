@@ -2,14 +2,14 @@
 
 from dataclasses import replace
 
-from excite_cli.campaign.records import Asked, Campaign
+from excite_cli.campaign.records import Campaign, CampaignOptions
 from excite_cli.report.page import render
 from excite_cli.report.rounds_page import rounds_page
 from tests.campaign.test_records import WHOLE
 
 
 def test_an_empty_one_is_a_page() -> None:
-    page = rounds_page(Campaign("", "", "", Asked()), "arm")
+    page = rounds_page(Campaign("", "", "", CampaignOptions()), "arm")
     assert "Round 1 goes on." in render(page)
     assert [section.anchor for section in page.sections] == ["rounds", "motions"]
 

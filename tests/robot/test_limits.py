@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.config.robot_spec import JointLimits, RobotSpec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.regressor import standard_parameters
@@ -23,8 +23,8 @@ from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.excitation.boundary import posture_of as boundary_posture
 from excite_cli.excitation.problem import build_problem
+from excite_cli.proposal.assumed_limits import plan_limits
 from excite_cli.proposal.joints import choose_joints
-from excite_cli.proposal.limits import plan_limits
 from excite_cli.proposal.propose import Proposal, Request, propose
 from excite_cli.robot.carried_bodies import MovedBodies
 from excite_cli.robot.description import load_description

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.effects.catalogue import kind_named

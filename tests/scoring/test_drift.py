@@ -8,7 +8,7 @@ import pytest
 from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.scoring.drift import shift_of, with_shift
-from excite_cli.scoring.records import Reason, ScoredRun
+from excite_cli.scoring.records import RunExplanation, ScoredRun
 
 NAMES = ("a", "b", "c", "d", "e", "f")
 NOTHING = Errors(0.1, 0.1, {}, {}, {}, {}, (0.0, 0.0), {}, {})
@@ -25,8 +25,8 @@ def runs(worse: float, since: int, seed: int = 0, count: int = 20) -> list[Score
     return [run(k, row) for k, row in enumerate(ratios)]
 
 
-def reason(joint: str) -> Reason:
-    return Reason(EffectRecord("encoder_offset", (joint,), {}, (0.01,)), {}, 0.6)
+def reason(joint: str) -> RunExplanation:
+    return RunExplanation(EffectRecord("encoder_offset", (joint,), {}, (0.01,)), {}, 0.6)
 
 
 def test_the_joint_and_the_run_are_seen() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from excite_cli import Case, identify, score
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.summary.score import runs_table, score_data, sentences
 from tests.cli.program import SMOKE
 from tests.diagnosis.simulated_arm import ELBOW, PITCH, ROBOT, SLIDE, plant, planted

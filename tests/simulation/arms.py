@@ -10,7 +10,7 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.measurement.dataset import Run
 from excite_cli.robot.model import Array, Robot, build_robot
-from excite_cli.simulation.ground_truth import Planted, plant
+from excite_cli.simulation.ground_truth import PlantedEffect, plant
 from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import Simulation, simulate
@@ -36,12 +36,12 @@ def motion(robot: Robot, seed: int = 0, name: str = "motion_1") -> PlannedMotion
     return PlannedMotion(name, trajectory, coefficients)
 
 
-def planted(kind: str, joints: tuple[int, ...], value: float, **others: float) -> Planted:
+def planted(kind: str, joints: tuple[int, ...], value: float, **others: float) -> PlantedEffect:
     return plant(kind_named(kind), joints, value, others)
 
 
 def played(
-    robot: Robot, *effects: Planted, settings: SimulationSettings = IDEAL, **changes: object
+    robot: Robot, *effects: PlantedEffect, settings: SimulationSettings = IDEAL, **changes: object
 ) -> Simulation:
     settings = replace(settings, **changes)  # type: ignore[arg-type]
     return simulate(robot, [motion(robot)], settings, effects)

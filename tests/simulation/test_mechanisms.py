@@ -18,7 +18,7 @@ from excite_cli.effects.catalogue import catalogue
 from excite_cli.errors import RobotError
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.build import assemble
-from excite_cli.simulation.ground_truth import Planted, plant
+from excite_cli.simulation.ground_truth import PlantedEffect, plant
 from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.simulate import Simulation, simulate
 from tests.simulation.arms import (
@@ -344,11 +344,11 @@ class SlowDrift(MagneticDetent):
 
 
 def test_effects_of_others_act_through_their_own_formula(robot: Robot, clean: Simulation) -> None:
-    simulation = played(robot, Planted(MagneticDetent((ELBOW,)), np.array([2.0])))
+    simulation = played(robot, PlantedEffect(MagneticDetent((ELBOW,)), np.array([2.0])))
     left = beyond_rigid(robot, simulation)
     q, v, _ = (inner(x)[:, ELBOW] for x in states(simulation.dataset.runs[0]))
     assert rms(left[:, ELBOW] - 2.0 * np.sin(8 * q) * np.cos(2 * v)) < 0.03
-    drifting = played(robot, Planted(SlowDrift((ELBOW,)), np.array([0.3]))).dataset.runs[0]
+    drifting = played(robot, PlantedEffect(SlowDrift((ELBOW,)), np.array([0.3]))).dataset.runs[0]
     grown = drifting.tau[:, ELBOW] - clean.dataset.runs[0].tau[:, ELBOW]
     assert grown == pytest.approx(0.3 * drifting.t, abs=1e-9)
 

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli.config.load import load_spec
+from excite_cli.config.load_spec import load_spec
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.random_baseline import random_baseline
 from excite_cli.excitation.result import Result

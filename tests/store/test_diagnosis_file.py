@@ -72,16 +72,16 @@ def test_approximations_are_records(
     with h5py.File(path, "a") as file:
         (effect,) = json.loads(file["records/effects"][()])
         assert effect["approximates"] == record
-        (left,) = json.loads(file["records/large_rests"][()])
+        (left,) = json.loads(file["records/excess_residuals"][()])
         assert left["depends_on"] == ["q[elbow]", "load[elbow]"]
     assert read_diagnosis(path).effects[0].approximates == found
 
 
 def test_a_dependence_on_nothing_known_is_damage(diagnosis: Diagnosis, path: Path) -> None:
     with h5py.File(path, "a") as file:
-        text = file["records/large_rests"][()].decode().replace("load[", "mood of load[")
-        del file["records/large_rests"]
-        file["records/large_rests"] = text
+        text = file["records/excess_residuals"][()].decode().replace("load[", "mood of load[")
+        del file["records/excess_residuals"]
+        file["records/excess_residuals"] = text
     with pytest.raises(FileError, match="damaged"):
         read_diagnosis(path)
 

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from excite_cli.config.load import parse_spec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.errors import FileError

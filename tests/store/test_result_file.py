@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from excite_cli import __version__, atomic
-from excite_cli.config.load import load_spec, parse_spec
+from excite_cli.config.load_spec import load_spec, parse_spec
 from excite_cli.criteria.base import condition_number, singular_values
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import build_problem

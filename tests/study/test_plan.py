@@ -9,10 +9,10 @@ from excite_cli.api.studying import do_case
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.study.case import StudyTask
 from excite_cli.study.plan import planned_cases
-from excite_cli.study.vary import Varied, parse_vary
+from excite_cli.study.vary import VariedKey, parse_vary
 
 ARM = Path(__file__).parents[2] / "data" / "smoke_arm.urdf"
-SEEDS = [Varied("seed", ("1", "2"))]
+SEEDS = [VariedKey("seed", ("1", "2"))]
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 import pytest
 
 from excite_cli.errors import ConfigError
-from excite_cli.study.vary import Varied, combinations, parse_vary
+from excite_cli.study.vary import VariedKey, combinations, parse_vary
 
 
 @pytest.mark.parametrize(
@@ -17,7 +17,7 @@ from excite_cli.study.vary import Varied, combinations, parse_vary
     ],
 )  # fmt: skip
 def test_values(text: str, values: tuple[str, ...]) -> None:
-    assert parse_vary(text) == Varied(text.partition("=")[0], values)
+    assert parse_vary(text) == VariedKey(text.partition("=")[0], values)
 
 
 @pytest.mark.parametrize(
@@ -38,13 +38,13 @@ def test_what_cannot_be_read_is_said(text: str, said: str) -> None:
 
 
 def test_all_combinations_the_last_key_fastest() -> None:
-    both = combinations([Varied("a", ("1", "2")), Varied("b", ("x", "y"))])
+    both = combinations([VariedKey("a", ("1", "2")), VariedKey("b", ("x", "y"))])
     assert [tuple(each.values()) for each in both] == [
         ("1", "x"), ("1", "y"), ("2", "x"), ("2", "y"),
     ]  # fmt: skip
     assert combinations([]) == [{}]
     with pytest.raises(ConfigError, match="given twice"):
-        combinations([Varied("a", ("1",)), Varied("a", ("2",))])
+        combinations([VariedKey("a", ("1",)), VariedKey("a", ("2",))])
     long = tuple(map(str, range(1000)))
     with pytest.raises(ConfigError, match="1000000 combinations"):
-        combinations([Varied("a", long), Varied("b", long)])
+        combinations([VariedKey("a", long), VariedKey("b", long)])

@@ -7,14 +7,14 @@ import pytest
 
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.records import (
-    Absorbed,
     Approximation,
     Assumption,
+    ConfoundedCandidate,
     Diagnosis,
     EffectRecord,
+    ErrorReduction,
     HeldOutEnds,
     JointAlias,
-    Removed,
 )
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.effects.base import Value
@@ -98,7 +98,7 @@ def test_the_noise_floor_stands_beside_the_errors(doubted: Diagnosis) -> None:
 
 
 def test_without_repeated_periods_nothing_is_said_of_noise(doubted: Diagnosis) -> None:
-    assert "noise" not in printed(replace(doubted, large_rests=()))
+    assert "noise" not in printed(replace(doubted, excess_residuals=()))
 
 
 def test_pairs_that_cannot_be_told_from_one_effect() -> None:
@@ -130,19 +130,19 @@ def test_another_name_of_the_same_torque_is_told_as_such() -> None:
 
 
 def test_nothing_is_missing_only_where_nothing_large_is_left(doubted: Diagnosis) -> None:
-    (rest,) = doubted.large_rests
-    bare = replace(doubted, effects=(), large_rests=())
+    (rest,) = doubted.excess_residuals
+    bare = replace(doubted, effects=(), excess_residuals=())
     assert "Nothing is missing" in printed(bare)
     for left, whole in ((rest, False), (replace(rest, certain=False), True)):
-        text = printed(replace(bare, large_rests=(left,)))
+        text = printed(replace(bare, excess_residuals=(left,)))
         assert ("Nothing is missing" in text) == whole
         assert "0.8" in text
         assert "elbow" in text
-    assert "q[elbow] and load[elbow]" in printed(replace(bare, large_rests=(rest,)))
+    assert "q[elbow] and load[elbow]" in printed(replace(bare, excess_residuals=(rest,)))
     alone = replace(rest, depends_on=(), predictable=0.0, certain=False, noise=None)
-    assert "the noise level is unknown" in printed(replace(bare, large_rests=(alone,)))
+    assert "the noise level is unknown" in printed(replace(bare, excess_residuals=(alone,)))
     assert "coloured noise could be as large" in printed(
-        replace(bare, large_rests=(replace(alone, noise=0.1),))
+        replace(bare, excess_residuals=(replace(alone, noise=0.1),))
     )
     assert diagnosis_answer(doubted, "arm.yaml", {}).data["noise_floor"] is None
 
@@ -157,7 +157,10 @@ def bad() -> Diagnosis:
         share_of_residual=1e-5,
         gain=0.01,
         verdict=HeldOutVerdict.HARMFUL,
-        removes={"elbow": Removed(-0.3, -0.4, -2.0), "slide": Removed(0.01, 0.02, 0.1)},
+        removes={
+            "elbow": ErrorReduction(-0.3, -0.4, -2.0),
+            "slide": ErrorReduction(0.01, 0.02, 0.1),
+        },
     )
     other = replace(named, share_of_residual=1e-4, gain=0.01, verdict=HeldOutVerdict.NOT_CONFIRMED)
     after = replace(found.after, mean_relative=0.435, samples=dict.fromkeys(found.joint_names, 80))
@@ -214,7 +217,7 @@ def test_every_effect_shows_what_it_is_worth_on_held_out_data(
     assert "2 small effects (each below 1% of the error reduction)" in text
     assert "viscous_friction on elbow (not confirmed)" in text
     assert "- harmful, 40.00 pp higher\n" in text  # whatever it takes off
-    elsewhere = replace(bad.effects[0], removes={"slide": Removed(0.01, 0.02, 0.1)})
+    elsewhere = replace(bad.effects[0], removes={"slide": ErrorReduction(0.01, 0.02, 0.1)})
     assert "harmful, 2.00 pp lower on slide\n" in printed(replace(bad, effects=(elsewhere,)))
     assert "confirmed, 6.00 pp lower a function of v[elbow]" in printed(doubted)
     older = replace(bad.effects[0], verdict=None, removes={})
@@ -306,7 +309,7 @@ def test_what_rests_on_a_weight_is_told_so_and_never_small(weighed: Diagnosis) -
 
 def test_what_inertias_take_up_is_told_with_what_settles_it(weighed: Diagnosis) -> None:
     kinds = ("torque_gain", "armature", "torque_gain", "wrench_gain", "kind_of_a_package")
-    absorbed = tuple(Absorbed(kind, ("elbow",), ("Izz[elbow]",), 0.0) for kind in kinds)
+    absorbed = tuple(ConfoundedCandidate(kind, ("elbow",), ("Izz[elbow]",), 0.0) for kind in kinds)
     text = printed(replace(weighed, effects=(), absorbed=absorbed))
     told = [line for line in text.splitlines() if " is identifiable with " in line]
     assert [line.split()[0] for line in told] == ["torque_gain", "wrench_gain"]

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from excite_cli import check, load_case, load_problem, plan, read_result, write_result
-from excite_cli.api.campaigning import Asked, Measure, run_campaign
+from excite_cli.api.campaigning import CampaignOptions, Measure, run_campaign
 from excite_cli.api.comparing import optimized_for
 from excite_cli.campaign.measure import NotMeasuredError, Take
 from excite_cli.errors import FileError
@@ -261,7 +261,7 @@ class _Absent(Measure):
 @pytest.mark.parametrize("name", [A_LITTLE, "the margins", "no digest"])
 def test_a_campaign_plays_nothing_that_was_changed(tmp_path: Path, name: str) -> None:
     changes = ["optimizer.max_iterations=2", "optimizer.restarts=1"]
-    case, measure, asked = load_case(SMOKE, changes), _Absent(), Asked(entry=False)
+    case, measure, asked = load_case(SMOKE, changes), _Absent(), CampaignOptions(entry=False)
     heard: list[Note] = []
     folder = tmp_path / "campaign"
     with pytest.raises(NotMeasuredError):

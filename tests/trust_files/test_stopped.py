@@ -12,7 +12,7 @@ import typer
 
 from benchmarks.trust.kill_commands import numbers
 from excite_cli.cli.app import app
-from excite_cli.cli.ending import run_guarded
+from excite_cli.cli.exit_status import run_guarded
 from tests.cli.program import EXCITE, SMOKE, Installed, environment
 from tests.end_to_end.conftest import cache, excite
 

@@ -23,7 +23,7 @@ from excite_cli.view.browser import (
 )
 from excite_cli.view.instants import instants_of
 from excite_cli.view.scene import build_scene
-from excite_cli.view.stage import Stage, _quaternion
+from excite_cli.view.stage import SceneNodes, _quaternion
 
 viser = pytest.importorskip("viser")
 
@@ -79,7 +79,7 @@ def test_the_player_moves_the_robot(problem: Problem, segment: Segment, port: in
     )
     server = _server(viser, Serving(port=port), "arm")
     try:
-        stage = Stage(server, scene)
+        stage = SceneNodes(server, scene)
         longer = replace(segment, name="slow", trajectory=segment.trajectory.slowed(0.5))
         player = _Player(server, stage, problem, [segment, longer], Serving())
         began = time.monotonic()

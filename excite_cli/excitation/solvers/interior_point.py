@@ -34,7 +34,7 @@ from excite_cli.excitation.objective import Spectrum
 from excite_cli.excitation.progress import ProgressCallback, Stage, Status
 from excite_cli.excitation.residuals import (
     REACH,
-    Rows,
+    ResidualDerivatives,
     squared_per_instant,
     summed_per_instant,
 )
@@ -74,7 +74,7 @@ class _Near:
     """Gradients of a constraint that is not linear, where its residuals (T, m) are `near`."""
 
     near: NDArray[np.bool_]
-    rows: Rows
+    rows: ResidualDerivatives
 
 
 @dataclass(frozen=True)
@@ -276,7 +276,7 @@ class _Run:
             near = value < reach
             if not near.any():
                 continue
-            rows: Rows = task.residuals.rows(point.states, index, near)
+            rows: ResidualDerivatives = task.residuals.rows(point.states, index, near)
             found[index] = _Near(near, rows)
             grid.add_gradient(gradient, summed_per_instant(rows, first, self.samples))
             for pair, squares in squared_per_instant(rows, second, self.samples).items():

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 
 @dataclass(frozen=True)
-class Asked:
+class ConversionRequest:
     """What a description is read with: folders of packages, and arguments of xacro.
 
     absent: packages that are nowhere, for which the one that the file lies in stands.
@@ -48,7 +48,7 @@ class RobotFormat(ABC):
         """Whether a file with that text is of this format."""
 
     @abstractmethod
-    def urdf(self, path: Path, text: str, asked: Asked) -> Urdf:
+    def urdf(self, path: Path, text: str, asked: ConversionRequest) -> Urdf:
         """The same robot as a URDF.
 
         Raises
@@ -71,7 +71,7 @@ class RobotFormat(ABC):
         """
         return
 
-    def sources(self, path: Path, text: str, asked: Asked) -> tuple[Path, ...] | None:
+    def sources(self, path: Path, text: str, asked: ConversionRequest) -> tuple[Path, ...] | None:
         """All files whose content decides what becomes of `path`; None where that is not known.
 
         Raises

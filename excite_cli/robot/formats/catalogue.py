@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
+from excite_cli.robot.formats.base import ConversionRequest, RobotFormat, Urdf
 from excite_cli.robot.formats.converted import converted
 from excite_cli.robot.formats.mjcf import Mjcf
 from excite_cli.robot.formats.plain_urdf import PlainUrdf
@@ -12,7 +12,7 @@ from excite_cli.robot.formats.xacro import Xacro
 FORMATS: tuple[RobotFormat, ...] = (Xacro(), Mjcf(), Sdf(), PlainUrdf())
 
 
-def as_urdf(path: Path, text: str, asked: Asked) -> Urdf:
+def as_urdf(path: Path, text: str, asked: ConversionRequest) -> Urdf:
     """The robot of a file as a URDF.
 
     Raises

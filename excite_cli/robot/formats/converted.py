@@ -23,7 +23,7 @@ import numpy as np
 from excite_cli import __version__
 from excite_cli.disk_cache import store_arrays, stored_arrays
 from excite_cli.errors import ExciteError, MissingExtraError, RobotError
-from excite_cli.robot.allowed_files import Needed, OutsideError, allowed_files
+from excite_cli.robot.allowed_files import FolderRequest, OutsideError, allowed_files
 from excite_cli.robot.confinement import (
     OUT_OF_TIME,
     command,
@@ -32,10 +32,10 @@ from excite_cli.robot.confinement import (
     limit_memory,
     set_alarm,
 )
-from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
+from excite_cli.robot.formats.base import ConversionRequest, RobotFormat, Urdf
 from excite_cli.robot.formats.kept_meshes import is_sound, kept_meshes_folder
 from excite_cli.robot.mesh_trial import MAX_BYTES
-from excite_cli.robot.packages import (
+from excite_cli.robot.ros_packages import (
     MissingPackageError,
     is_name,
     missing_package,
@@ -52,7 +52,7 @@ _FORM = "3"  # of what is kept; another one after a change of what formats write
 _OF_ERRORS = {each.__name__: each for each in (RobotError, MissingExtraError)}
 
 
-def converted(form: RobotFormat, path: Path, text: str, asked: Asked) -> Urdf:
+def converted(form: RobotFormat, path: Path, text: str, asked: ConversionRequest) -> Urdf:
     """What `form.urdf` gives, or what it gave for the same content before.
 
     Raises
@@ -78,7 +78,7 @@ def converted(form: RobotFormat, path: Path, text: str, asked: Asked) -> Urdf:
     return found
 
 
-def _without(name: str, path: Path, asked: Asked) -> Asked:
+def _without(name: str, path: Path, asked: ConversionRequest) -> ConversionRequest:
     """The same, without a package that is nowhere; the one that the file lies in stands for it.
 
     Raises
@@ -93,7 +93,9 @@ def _without(name: str, path: Path, asked: Asked) -> Asked:
     return replace(asked, absent=(*asked.absent, name))
 
 
-def _key(form: RobotFormat, path: Path, sources: Sequence[Path], asked: Asked) -> str | None:
+def _key(
+    form: RobotFormat, path: Path, sources: Sequence[Path], asked: ConversionRequest
+) -> str | None:
     digest = hashlib.sha256(f"{form.name}|{__version__}|{_FORM}|{path}|".encode())
     digest.update(json.dumps([asked.package_dirs, dict(asked.arguments)], default=str).encode())
     for source in sources:
@@ -127,7 +129,9 @@ def _believed(found: Urdf, path: Path) -> Urdf:
     return replace(found, folders=tuple(each for each in found.folders if each in known))
 
 
-def _answered(form: RobotFormat, path: Path, text: str, asked: Asked, seconds: float) -> Urdf:
+def _answered(
+    form: RobotFormat, path: Path, text: str, asked: ConversionRequest, seconds: float
+) -> Urdf:
     """The answer of a process of its own, which may compute for so long [s]."""
     question = {
         "module": type(form).__module__,
@@ -164,7 +168,7 @@ def _answered(form: RobotFormat, path: Path, text: str, asked: Asked, seconds: f
     if "needed" in answer:
         name, folder, near = answer["needed"]
         allowed = allowed_files(path, asked.package_dirs)
-        raise OutsideError(path.name, Needed(name, Path(folder), near), allowed.own)
+        raise OutsideError(path.name, FolderRequest(name, Path(folder), near), allowed.own)
     if "error" in answer:
         raise _OF_ERRORS.get(answer["error"], RobotError)(answer["message"])
     how = "takes too long" if status in OUT_OF_TIME else "fails or takes too much memory"
@@ -191,7 +195,7 @@ def serve() -> None:
     form = getattr(import_module(question["module"]), question["format"])()
     path = Path(question["path"])
     packages = tuple(question["package_dirs"])
-    asked = Asked(packages, question["arguments"], tuple(question["absent"]))
+    asked = ConversionRequest(packages, question["arguments"], tuple(question["absent"]))
     limit_memory(_MAX_MEMORY)
     set_alarm(question["seconds"])
     try:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from excite_cli.errors import MissingExtraError, RobotError
 from excite_cli.robot.allowed_files import allowed_files
-from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
+from excite_cli.robot.formats.base import ConversionRequest, RobotFormat, Urdf
 from excite_cli.robot.formats.mjcf_sources import Ranges, compiled, mjcf_sources
 from excite_cli.robot.formats.urdf_parts import (
     add_inertial,
@@ -55,7 +55,7 @@ class Mjcf(RobotFormat):
         """MuJoCo."""
         _library()
 
-    def urdf(self, path: Path, text: str, asked: Asked) -> Urdf:
+    def urdf(self, path: Path, text: str, asked: ConversionRequest) -> Urdf:
         """Bodies as links with inertias, shapes, joints, limits, efforts, friction, couplings."""
         mujoco = _library()
         try:
@@ -65,7 +65,7 @@ class Mjcf(RobotFormat):
             raise RobotError(f"{path.name}: MuJoCo cannot compile it: {reason[:400]}") from error
         return _Writer(model, path, ranges).written()
 
-    def sources(self, path: Path, text: str, asked: Asked) -> tuple[Path, ...] | None:
+    def sources(self, path: Path, text: str, asked: ConversionRequest) -> tuple[Path, ...] | None:
         """Includes, meshes, textures and height fields."""
         return mjcf_sources(path, text, allowed_files(path, asked.package_dirs))
 

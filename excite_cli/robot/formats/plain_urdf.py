@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
+from excite_cli.robot.formats.base import ConversionRequest, RobotFormat, Urdf
 
 
 class PlainUrdf(RobotFormat):
@@ -15,6 +15,6 @@ class PlainUrdf(RobotFormat):
         """Any file."""
         return True
 
-    def urdf(self, path: Path, text: str, asked: Asked) -> Urdf:
+    def urdf(self, path: Path, text: str, asked: ConversionRequest) -> Urdf:
         """The text as it is."""
         return Urdf(text)

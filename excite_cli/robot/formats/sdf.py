@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from excite_cli.errors import RobotError
-from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
+from excite_cli.robot.formats.base import ConversionRequest, RobotFormat, Urdf
 from excite_cli.robot.formats.urdf_parts import (
     add_inertial,
     add_origin,
@@ -51,7 +51,7 @@ class Sdf(RobotFormat):
             return False
         return root_tag(text) == "sdf"
 
-    def urdf(self, path: Path, text: str, asked: Asked) -> Urdf:
+    def urdf(self, path: Path, text: str, asked: ConversionRequest) -> Urdf:
         """Links with inertias and shapes, joints with limits, friction and couplings."""
         root = ElementTree.fromstring(text)
         model, notes = _model(path, root)
@@ -62,7 +62,7 @@ class Sdf(RobotFormat):
         except ValueError as error:
             raise RobotError(f"{path.name}: its SDF cannot be read: {error}.") from error
 
-    def sources(self, path: Path, text: str, asked: Asked) -> tuple[Path, ...] | None:
+    def sources(self, path: Path, text: str, asked: ConversionRequest) -> tuple[Path, ...] | None:
         """The file alone: meshes are only named."""
         return (path,)
 

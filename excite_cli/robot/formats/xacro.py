@@ -18,8 +18,8 @@ from xml.dom import minidom
 from excite_cli.errors import MissingExtraError, RobotError
 from excite_cli.robot.allowed_files import AllowedFiles, OutsideError, allowed_files
 from excite_cli.robot.formats import xacro_expression
-from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
-from excite_cli.robot.packages import MissingPackageError, find_package, unnamed_package
+from excite_cli.robot.formats.base import ConversionRequest, RobotFormat, Urdf
+from excite_cli.robot.ros_packages import MissingPackageError, find_package, unnamed_package
 
 _NAMESPACE = re.compile(r"xmlns:xacro\s*=")
 _VARIABLES = ("ROS_DISTRO", "ROS_VERSION")  # of the environment, that a file may ask for
@@ -50,7 +50,7 @@ class Xacro(RobotFormat):
         """The xacro package."""
         library_of_xacro()
 
-    def urdf(self, path: Path, text: str, asked: Asked) -> Urdf:
+    def urdf(self, path: Path, text: str, asked: ConversionRequest) -> Urdf:
         """The expanded text; `$(find package)` as `_Packages.find` does."""
         library = library_of_xacro()
         allowed = allowed_files(path, asked.package_dirs)

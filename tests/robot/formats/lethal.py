@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from excite_cli.errors import MissingExtraError
-from excite_cli.robot.formats.base import Asked, RobotFormat, Urdf
+from excite_cli.robot.formats.base import ConversionRequest, RobotFormat, Urdf
 
 
 class Lethal(RobotFormat):
@@ -19,7 +19,7 @@ class Lethal(RobotFormat):
     def recognises(self, path: Path, text: str) -> bool:
         return True
 
-    def urdf(self, path: Path, text: str, asked: Asked) -> Urdf:
+    def urdf(self, path: Path, text: str, asked: ConversionRequest) -> Urdf:
         if text == "abort":
             os.abort()
         if text == "run on":

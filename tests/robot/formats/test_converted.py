@@ -10,7 +10,7 @@ from excite_cli.errors import MissingExtraError, RobotError
 from excite_cli.robot.allowed_files import allowed_files
 from excite_cli.robot.description import load_description
 from excite_cli.robot.formats import converted as module
-from excite_cli.robot.formats.base import Asked, Urdf
+from excite_cli.robot.formats.base import ConversionRequest, Urdf
 from excite_cli.robot.formats.converted import converted
 from excite_cli.robot.formats.mjcf_sources import mjcf_sources
 
@@ -28,7 +28,7 @@ OBJ = "v 0 0 0\nv {0} 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 
 def given(folder: Path, text: str) -> Urdf:
     path = folder / "robot.x"
     path.write_text(text)
-    return converted(Lethal(), path, text, Asked())
+    return converted(Lethal(), path, text, ConversionRequest())
 
 
 @pytest.mark.parametrize(("text", "words"), [("abort", "fails"), ("grow", "too much memory")])

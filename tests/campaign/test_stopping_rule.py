@@ -4,9 +4,15 @@ from dataclasses import replace
 
 import pytest
 
-from excite_cli.campaign.ending import ended, left_on_newest, still_open
-from excite_cli.campaign.records import Asked, Campaign, PlayedMotion, Round, RoundFindings
-from excite_cli.diagnosis.records import Diagnosis, Removed
+from excite_cli.campaign.records import (
+    Campaign,
+    CampaignOptions,
+    CampaignRound,
+    PlayedMotion,
+    RoundFindings,
+)
+from excite_cli.campaign.stopping_rule import ended, left_on_newest, still_open
+from excite_cli.diagnosis.records import Diagnosis, ErrorReduction
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.identification.errors_of_torque import Errors
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis
@@ -23,13 +29,13 @@ def found() -> Diagnosis:
     diagnosis = make_diagnosis()
     good = errors(0.01, 0.1, diagnosis.joint_names)
     before = errors(0.05, 0.5, diagnosis.joint_names)
-    return replace(diagnosis, trained=good, before=before, after=good, large_rests=())
+    return replace(diagnosis, trained=good, before=before, after=good, excess_residuals=())
 
 
 def test_what_is_open(found: Diagnosis) -> None:
     assert still_open(found, ()) == ()
     assert still_open(found, ("a or b",)) == ("a or b: not distinguished yet",)
-    left = replace(found, large_rests=make_diagnosis().large_rests)
+    left = replace(found, excess_residuals=make_diagnosis().excess_residuals)
     assert still_open(left, ()) == ("elbow: excess residual of the torque",)
     useless = replace(found, before=found.after, after=errors(0.011, 0.1, found.joint_names))
     words = "the effects found do not lower the error on the newest motion"
@@ -59,7 +65,10 @@ def test_a_name_that_does_harm_is_open(found: Diagnosis, worse: float, open_: bo
     named = replace(
         found.effects[0],
         verdict=HeldOutVerdict.HARMFUL,
-        removes={"elbow": Removed(-worse, -worse, -0.1), "slide": Removed(0.1, 0.1, 1.0)},
+        removes={
+            "elbow": ErrorReduction(-worse, -worse, -0.1),
+            "slide": ErrorReduction(0.1, 0.1, 1.0),
+        },
     )
     told = still_open(replace(found, effects=(named,)), ())
     words = "viscous_friction on elbow: the newest motion is predicted worse with it"
@@ -76,8 +85,8 @@ def campaign(
             PlayedMotion(f"r{number}_m{k}", "excite", "p.h5", k, 1.0, 10.0, "log") for k in (1, 2)
         ]
         findings = RoundFindings(0.1, 0.01, ("spring on elbow",), open_, pairs, known)
-        made.append(Round(number, tuple(motions), findings))
-    return Campaign("", "", "", Asked(**asked), tuple(made))  # type: ignore[arg-type]
+        made.append(CampaignRound(number, tuple(motions), findings))
+    return Campaign("", "", "", CampaignOptions(**asked), tuple(made))  # type: ignore[arg-type]
 
 
 NOTHING: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())

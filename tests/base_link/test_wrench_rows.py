@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from excite_cli.base_link.rows import with_base
+from excite_cli.base_link.wrench_rows import with_base
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody

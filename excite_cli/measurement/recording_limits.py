@@ -8,7 +8,7 @@ from excite_cli.measurement.dataset import Array, Mask
 
 
 @dataclass(frozen=True)
-class Limits:
+class RecordingLimits:
     """What the robot allows, (n,) each, infinite where nothing is known; which joints turn."""
 
     lower: Array
@@ -18,7 +18,7 @@ class Limits:
     revolute: Mask
 
     @classmethod
-    def unknown(cls, n: int) -> "Limits":
+    def unknown(cls, n: int) -> "RecordingLimits":
         """No limits, all joints turn."""
         infinite = np.full(n, np.inf)
         return cls(-infinite, infinite, infinite, infinite, np.ones(n, bool))

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from excite_cli.cli.ending import BUG, run_guarded
+from excite_cli.cli.exit_status import BUG, run_guarded
 from tests.cli.conftest import Run
 from tests.cli.program import SMOKE, Program
 

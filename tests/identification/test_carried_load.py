@@ -20,7 +20,7 @@ from excite_cli.api.load_planning import LoadProblem
 from excite_cli.api.loading import Case
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.errors import ConfigError, FileError
-from excite_cli.identification.load import expected_load
+from excite_cli.identification.carried_load import expected_load
 from excite_cli.identification.stored_model import StoredFit
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.store.fit_file import read_fit

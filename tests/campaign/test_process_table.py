@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli.campaign import processes
-from excite_cli.campaign.processes import (
+from excite_cli.campaign import process_table
+from excite_cli.campaign.process_table import (
     MARK,
     Escalation,
     Process,
@@ -142,8 +142,8 @@ class Bench:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now, self.running = 0.0, [INSIDE, OUTSIDE]
         self.sent: list[tuple[int, tuple[int, ...]]] = []
-        monkeypatch.setattr(processes.time, "monotonic", lambda: self.now)
-        monkeypatch.setattr(processes, "send_to_all", self._note)
+        monkeypatch.setattr(process_table.time, "monotonic", lambda: self.now)
+        monkeypatch.setattr(process_table, "send_to_all", self._note)
         self.ending = Escalation(lambda: self.running, 10, 5.0)
 
     def _note(self, processes: list[Process], group: int, number: int) -> None:

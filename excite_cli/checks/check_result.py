@@ -14,7 +14,7 @@ _SEVERITY: dict[Status, Literal["note", "warning", "error"]] = {
 
 
 @dataclass(frozen=True)
-class Result:
+class CheckResult:
     """Of the check `name`: its `status`, in which `joints` and `runs`, `evidence` in numbers.
 
     `settings`: what to write in the config, by the path of the key. `kind` is that of the finding.

@@ -18,11 +18,11 @@ import pytest
 from excite_cli.api.planning import plan
 from excite_cli.config.spec import SequenceSpec
 from excite_cli.errors import NoAdmissibleMotionError
-from excite_cli.excitation import generate, one_start
+from excite_cli.excitation import one_start, sequence
 from excite_cli.excitation.motion import Motion, Outcome
-from excite_cli.excitation.one_start import FoundMotion, Search
+from excite_cli.excitation.one_start import FoundMotion, StartContext
 from excite_cli.excitation.problem import Problem
-from excite_cli.excitation.progress import Figure, Measure, Progress, Status
+from excite_cli.excitation.progress import Figure, Progress, ProgressMeasure, Status
 from excite_cli.excitation.random_baseline import RandomBaseline, random_baseline
 from excite_cli.excitation.solvers.base import Effort
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
@@ -116,7 +116,7 @@ def test_random_candidates_do_not_depend_on_who_draws(two: Processes) -> None:
 
 def outcome(value: float, x: Any, status: Any = Status.CONVERGED) -> FoundMotion:
     return FoundMotion(
-        value, Figure(Measure.CONDITION_NUMBER, value), Outcome(x, status, 10, 20), 0.0
+        value, Figure(ProgressMeasure.CONDITION_NUMBER, value), Outcome(x, status, 10, 20), 0.0
     )
 
 
@@ -131,7 +131,7 @@ def test_the_best_of_several_starts(problem: Problem) -> None:
                 return [*found]
 
         solver, stack = InteriorPoint(), Stack.empty(problem.columns)
-        return generate.generate_motion(problem, solver, stack, 1, 1, print, None, Given())
+        return sequence.generate_motion(problem, solver, stack, 1, 1, print, None, Given())
 
     failure = NoAdmissibleMotionError("nothing here")
     motion = best(failure, outcome(1.0, 0.5 * x), outcome(1.0, x))
@@ -156,7 +156,7 @@ def test_the_best_of_several_starts(problem: Problem) -> None:
 )
 def test_whatever_a_problem_holds_can_travel(settings: list[str]) -> None:
     problem = quick(*settings)
-    search = Search(problem, InteriorPoint())
+    search = StartContext(problem, InteriorPoint())
     there = pickle.loads(pickle.dumps(search))
     assert type(there.solver) is type(search.solver)
     alpha = drawn(problem, 0.1)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from excite_cli.kernels import compiled
-from excite_cli.kernels.arguments import Array, CheckedFunction, Number, Size
+from excite_cli.kernels.array_arguments import Array, CheckedFunction, Number, Size
 from excite_cli.kernels.signatures import SIGNATURES
 
 # Any sizes that differ from each other; those of a table's knots are at least 8.
