@@ -14,7 +14,7 @@ PATIENCE = 60.0  # s, for a busy machine
 _SCRIPT = """
 import resource, signal, sys
 from pathlib import Path
-from excite_cli.campaign.command import Command
+from excite_cli.campaign.command import MeasureCommand
 from excite_cli.campaign.measure import NotMeasuredError
 from excite_cli.cli.stopping import heed_signals, stopped
 from tests.campaign.campaign_process import take_in
@@ -30,7 +30,7 @@ for each in (signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
 resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 heed_signals()
 try:
-    command = Command.of(line, limit=float(limit), tell=say, grace=float(grace))
+    command = MeasureCommand.of(line, limit=float(limit), tell=say, grace=float(grace))
     command.take(take_in(Path(folder)))
 except NotMeasuredError as error:
     print(error, file=sys.stderr)

@@ -78,6 +78,8 @@ ctypes.CDLL(None).pthread_exit(None)
     finally:
         process.kill()
         process.wait()
+        if process.stdout is not None:
+            process.stdout.close()
 
 
 def test_mark_and_session_are_told_from_others(

@@ -97,7 +97,7 @@ def test_it_ends_once_a_motion_looked_for_more_and_nothing_is_open() -> None:
     done = ended(campaign(NOTHING, NOTHING), None)
     assert done.ended == "complete"
     assert "identified without r2_m2" in done.reason
-    assert "(spring on elbow)" in done.reason
+    assert "Effects: spring on elbow; none is ambiguous." in done.reason
 
 
 OPEN = (("x",), ())

@@ -179,7 +179,9 @@ def test_a_slowed_motion_has_room(excite: Program, two_motions: Run) -> None:
         assert motion["violations"] == 0
         worst = motion["worst"]["joint_velocity"]
         assert worst["share"] >= 0.7 - 1e-9
-    assert "of its pace" in excite("check", SMOKE, two_motions.path, "--slow", "0.3").stderr
+    assert (
+        "of its planned speed" in excite("check", SMOKE, two_motions.path, "--slow", "0.3").stderr
+    )
     assert "--slow 1.5" in excite.refused("check", SMOKE, two_motions.path, "--slow", "1.5")
 
 

@@ -100,7 +100,7 @@ def test_parts_add_up_to_the_fall_of_the_error(outcome: Outcome) -> None:
     fallen = elbow["error_reduction"]
     assert max(fallen, key=lambda joint: fallen[joint]) == "elbow"
     assert answer["shares"] == {"friction": pytest.approx(1.0)}
-    said = "Friction accounts for nearly all of the unmodelled torque, most on "
+    said = "Friction accounts for nearly all of the error reduction, largest on "
     assert answer["answer"].startswith(said)
 
 
@@ -160,7 +160,7 @@ def test_people_get_tables(outcome: Outcome, excite: Program) -> None:
     run = excite.good("diagnose", SMOKE, outcome.data, *QUICK, "--held-out", "motion_1_take_1")
     for words in (
         "What the declared model lacks", "coulomb_friction", "N·m",
-        "Error of the torque on data never used (motion_1_take_1)", "Next motion",
+        "Error of the torque on held-out data (motion_1_take_1)", "Next: repeat with -o",
     ):  # fmt: skip
         assert words in run.stdout
     assert list(excite.folder.iterdir()) == []  # nothing is written unasked
@@ -171,7 +171,7 @@ def test_overwrite_replaces(outcome: Outcome, excite: Program) -> None:
     path.write_text("old")
     run = excite.good("diagnose", SMOKE, outcome.data, *QUICK, "-o", path, "--overwrite", "-q")
     assert run.stderr == ""
-    assert "Next motion" in run.stdout
+    assert "Next: plan a motion" in run.stdout
     assert {e.effect.kind for e in read_diagnosis(path).effects} == {kind for kind, _ in PLANTED}
 
 
@@ -291,7 +291,7 @@ def test_a_joint_without_torque_is_left_out_and_the_others_are_found(
     fitted = excite.answer("identify", SMOKE, path, *without)
     assert fitted["error"]["rms_raw"]["wrist_roll"] is None
     table = excite("identify", SMOKE, path, *without).stdout
-    assert "Error of the torque on held-out data" in table
+    assert "Torque error on held-out data" in table
     assert not [line for line in table.splitlines() if line.startswith("wrist_roll ")]
 
 

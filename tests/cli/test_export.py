@@ -42,7 +42,7 @@ def test_files_are_named_after_the_result_and_never_overwritten(
     words = ("export", two_motions.path, "-f", name, "--motion", "2", "--rate", "50")
     suffix = {"csv": ".csv", "ros2": ".yaml", "moveit": ".json", "npz": ".npz"}.get(name, "")
     path = excite.folder / f"arm_motion_2{suffix}"
-    assert excite.good(*words).stdout == f"{path.name}: motion_2, 301 instants, 6 s\n"
+    assert excite.good(*words).stdout == f"{path.name}: motion_2, 301 samples, 6 s\n"
     before = read_own_motion(path)
     assert "exists already" in excite.refused(*words, "--slow", "0.1")
     assert np.array_equal(read_own_motion(path).q, before.q)

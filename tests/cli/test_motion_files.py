@@ -49,7 +49,7 @@ def test_units_that_cannot_be_right(excite: Program, changes: dict[str, float], 
 
 def test_files_of_another_kind_are_named(excite: Program, two_motions: Run) -> None:
     made = excite.good("simulate", SMOKE, two_motions.path, "--motion", "1", "-o", "data.h5")
-    assert "tracking [mrad]" in made.stdout  # units of headers are no markup
+    assert "RMS over joints [mrad]" in made.stdout  # units of headers are no markup
     assert "Effects" not in made.stdout  # there are none
     excite.good("identify", SMOKE, "data.h5", "-o", "fit.h5")
     assert "holds a fit, not a result" in excite.refused("check", SMOKE, "fit.h5")

@@ -48,7 +48,7 @@ def test_a_payload_is_the_reason_of_the_alarm(days: Program) -> None:
     ran = days("score", "fit.h5", "sound.h5", "loaded.h5", "-o", "score.h5")
     assert ran.returncode == 1, ran.stderr
     assert ran.stdout.startswith("2 of 4 runs exceed the model's tolerance. loaded: ")
-    assert "payload that the model does not have at slide, mass 2.0" in ran.stdout
+    assert "unmodelled payload at slide, mass 2.0" in ran.stdout
     asked = days("score", "fit.h5", "sound.h5", "loaded.h5", "--json")
     assert asked.returncode == 1
     found = json.loads(asked.stdout)
@@ -117,7 +117,7 @@ def test_a_torque_that_counts_the_other_way_is_told_before_what_may_have_changed
 
 def test_thresholds_hold_for_sound_runs_and_not_for_a_load(days: Program) -> None:
     words = ("score", "fit.h5", "first.h5", "--thresholds", "limits.json")
-    assert "s of fault-free data are too few" in days.refused(*words)
+    assert "s of usable data (ends are cut) are too few" in days.refused(*words)
     days.good("score", "fit.h5", "long.h5", "--thresholds", "limits.json")
     told = json.loads((days.folder / "limits.json").read_text())
     assert told["false_alarms_per_hour"] == 1.0

@@ -35,7 +35,7 @@ def test_a_study_of_settings(excite: Program) -> None:
         stored = read_result(excite.folder / case["files"][0])
         assert stored.seed == int(case["values"]["seed"])
         assert stored.motions[-1].stacked_condition_number == case["condition_number"]
-    rows = list(csv.DictReader((excite.folder / "s" / "study.csv").open()))
+    rows = list(csv.DictReader((excite.folder / "s" / "study.csv").read_text().splitlines()))
     assert [row["case"] for row in rows] == [case["name"] for case in answer["cases"]]
 
     before = (excite.folder / good[0]["files"][0]).stat().st_mtime_ns
