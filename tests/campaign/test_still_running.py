@@ -30,7 +30,11 @@ send = process_table.send_to_all
 supervisor.serve()
 """
 # SIGKILL does nothing, as with a process that waits for hardware.
-WITHOUT_FORCE = "process_table.send_to_all = lambda *given: None if given[2] == signal.SIGKILL else send(*given)"
+WITHOUT_FORCE = """
+process_table.send_to_all = (
+    lambda *given: None if given[2] == signal.SIGKILL else send(*given)
+)
+"""
 # As where there is no /proc, and no process can adopt another's children.
 WITHOUT_PROC = "supervisor.adopt_orphans = lambda: False"
 DEAF = """
