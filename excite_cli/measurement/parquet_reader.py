@@ -26,7 +26,8 @@ from excite_cli.measurement.reader import (
 # LeRobot's datasets: their files, and their columns in our names.
 #
 # `data/chunk-000/` has a file per episode (`episode_000000.parquet`, 2.1) or of several
-# (`file-000`, 3.0); `meta/info.json` names the entries of a column, as `elbow.pos`, `elbow.torque` or `elbow`.
+# (`file-000`, 3.0); `meta/info.json` names the entries of a column, as `elbow.pos`, `elbow.torque`
+# or `elbow`.
 
 STATE = "observation.state"
 EPISODE = "episode_index"

@@ -15,8 +15,7 @@ from tests.robot.random_robots import random_robot
 
 pytest.importorskip("mujoco")
 
-from benchmarks.battery.history import DahlBySpeed, MaxwellSlip
-from benchmarks.battery.outside import HardeningSpring
+from benchmarks.battery.outside import DahlBySpeed, HardeningSpring, MaxwellSlip
 
 MEANS = {0.0: "coulomb_friction", 1.0: "viscous_friction"}
 
