@@ -32,13 +32,13 @@ pytest.importorskip("mujoco")
 from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
-from tests.diagnosis.simulated_arm import ROBOT, SLIDE, Planted, planted, played
+from tests.diagnosis.simulated_arm import ROBOT, SLIDE, PlantedEffect, planted, played
 
 MASS, CENTRE = 1.8, (0.03, -0.02, 0.06)
 DECLARED = "effects: [{kind: viscous_friction}, {kind: coulomb_friction}]\n"
 
 
-def loaded_arm(*runs: int) -> list[Planted]:
+def loaded_arm(*runs: int) -> list[PlantedEffect]:
     """Friction of all joints, and the load in some runs."""
     kinds = ("viscous_friction", "coulomb_friction")
     friction = [planted(kind, j, 1.0) for kind in kinds for j in range(ROBOT.n)]
