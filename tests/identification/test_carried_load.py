@@ -124,7 +124,7 @@ def test_nothing_carried_is_told_as_nothing_and_a_changed_robot_as_that(
     rubbing = replace(last, tau=last.tau + 8.0 * np.sign(last.q - last.q.mean(axis=0)))
     found = identify_load(case, replace(loaded, runs=(rubbing,)), fit)
     assert "more_than_a_load" in {finding.kind for finding in found.findings}
-    assert "more than a payload" in str(load_answer(found).parts[0])
+    assert "more than a rigid payload" in str(load_answer(found).parts[0])
 
 
 def test_gains_that_nobody_told_are_in_the_load(case: Case, runs: Dataset, loaded: Dataset) -> None:
