@@ -139,7 +139,7 @@ _HOMES = {
         "NoAdmissibleMotionError",
         "RobotError",
     ),
-    "excitation.comparison": ("Comparison",),
+    "excitation.random_comparison": ("Comparison",),
     "excitation.inspection": ("Inspection", "Inspections"),
     "excitation.motion": ("Motion",),
     "excitation.problem": ("Problem",),

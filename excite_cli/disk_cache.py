@@ -27,7 +27,8 @@ _DIGEST = "digest"
 def stored_arrays(key: str) -> dict[str, NDArray[Any]] | None:
     """Arrays stored under `key`, or None."""
     try:
-        with np.load(_path(key), allow_pickle=False) as content:
+        # Given a name, numpy leaves the file open if it is no whole zip.
+        with _path(key).open("rb") as file, np.load(file, allow_pickle=False) as content:
             arrays = {name: content[name] for name in content.files}
     except (OSError, EOFError, RuntimeError, ValueError, zipfile.BadZipFile, zlib.error):
         return None

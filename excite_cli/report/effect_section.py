@@ -108,7 +108,7 @@ def _caption(found: Diagnosis, named: NamedEffect) -> str:
         f"lowers the cross-validation error by {named.gain:.1%}."
     )
     if told := held_out_in_words(named):
-        text += f" Held-out error: {told}."
+        text += f" Held-out, without it: {told}."
     everything = len(found.joint_names)
     if named.aliases:
         others = [f"{title_of(a.kind)} on {place_in_words(a, everything)}" for a in named.aliases]

@@ -24,7 +24,7 @@ from excite_cli.report.rows_chart import Axis, Bar, Form, Mark, Row, rows_chart
 _MOST_ROWS = 16
 _FORMS: dict[str, tuple[str, Form, Colour]] = {
     "yes": ("identifiable", "dot", "blue"),
-    "yes (not significant)": ("identifiable, not significant", "ring", "blue"),
+    "yes (zero within error)": ("identifiable, zero within error", "ring", "blue"),
     "NO": ("not identifiable", "cross", "vermilion"),
 }
 
@@ -140,7 +140,7 @@ def parameter_section(fit: Fit) -> PageSection:
     kept = " The URDF's inertias are kept as a prior." if fit.inertias == "cad" else ""
     lead = (
         f"{fixed} of {len(fit.names)} parameters are identifiable. A full dot: identifiable; a "
-        "hollow dot: identifiable, not significant; a cross with a dashed interval: not "
+        "hollow dot: identifiable, zero within error; a cross with a dashed interval: not "
         "identifiable. Standard deviations respect serial correlation: "
         f"the effective sample size is {fit.samples:.0f} of {fit.count}.{kept}"
     )

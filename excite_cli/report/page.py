@@ -10,7 +10,7 @@ import hashlib
 import importlib
 from dataclasses import dataclass
 from importlib import resources
-from typing import Any
+from typing import Any, get_args
 
 from excite_cli.errors import MissingExtraError
 from excite_cli.report.chart import Chart
@@ -70,6 +70,7 @@ class ChoiceBlock:
 
 
 Block = Chart | Plot | Charts | TableBlock | Text | Fold | ChoiceBlock
+_KINDS = {kind.__name__: kind for kind in get_args(Block)}
 
 
 @dataclass(frozen=True)
@@ -135,7 +136,7 @@ def _environment() -> Any:
     environment.globals["asset"] = lambda name: safe(_asset(name))
     environment.filters["drawing"] = lambda chart: safe(chart.svg)
     environment.filters["sentence"] = _sentence
-    environment.tests["of_kind"] = lambda block, name: type(block).__name__ == name
+    environment.tests["of_kind"] = lambda block, name: type(block) is _KINDS[name]
     return environment
 
 

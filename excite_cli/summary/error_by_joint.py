@@ -41,8 +41,8 @@ def _moving(found: Diagnosis) -> Table:
     mean = ("mean", *(percent(each.mean_relative_moving) for each in errors.values()))
     mean += ("",) * (3 + len(floor) + len(off))
     return Table(
-        f"Error of the torque on held-out data ({found.held_out_run}), where joints move (URDF as "
-        "given; declared model and textbook friction, both refitted)",
+        f"Error of the torque on held-out data ({found.held_out_run}), where joints move "
+        f"({_columns_in_words(found)})",
         ("joint", *errors, "RMS declared", "RMS with effects", "unit", *floor, *off),
         (*rows, mean),
         left=("joint", "unit"),
@@ -50,6 +50,14 @@ def _moving(found: Diagnosis) -> Table:
         bold=(len(rows),),
         parted=(len(rows),),
     )
+
+
+def _columns_in_words(found: Diagnosis) -> str:
+    """What the heads mean, of the columns that there are."""
+    given = "" if found.untouched is None else "URDF as given; "
+    if found.textbook is None:
+        return f"{given}declared model refitted"
+    return f"{given}declared model and textbook friction, both refitted"
 
 
 def _errors(found: Diagnosis) -> dict[str, Errors]:

@@ -66,8 +66,9 @@ def _times(found: GradientCheck) -> Table:
         (words, f"{1e3 * found.seconds[key]:.2f}", f"{forward / found.seconds[key]:.3g} ×")
         for key, words in _TIMES.items()
     )
-    head = ("computation", "ms", "faster than forward differences")
-    return Table("Time", head, rows, head[:1])
+    return Table(
+        "Time", ("computation", "ms", "faster than forward differences"), rows, ("computation",)
+    )
 
 
 def _verdict(found: GradientCheck) -> str:

@@ -158,9 +158,11 @@ def _joint_alias(alias: JointAlias, everything: int) -> str:
         " + ".join(what_and_where(one, everything) for one in side)
         for side in (alias.named, alias.others)
     )
+    single = len(alias.named) == 1
     if alias.same_torque:
-        return f"{named} produce the same torque as {others}: no motion distinguishes them"
-    return f"{named} are indistinguishable from: {others}"
+        produce = "produces" if single else "produce"
+        return f"{named} {produce} the same torque as {others}: no motion distinguishes them"
+    return f"{named} {'is' if single else 'are'} indistinguishable from: {others}"
 
 
 def what_and_where(record: EffectRecord, everything: int) -> str:

@@ -37,9 +37,9 @@ def test_a_simulation(loop: Loop) -> None:
     assert "N·m" not in slides
     (run,) = (dict(zip(runs.columns, row, strict=True)) for row in runs.rows)
     elbow, slide = 1e3 * found.tracking["motion_1"]
-    assert run["tracking [mrad]"] == f"{elbow:.3f}"
-    assert run["tracking [mm]"] == f"{slide:.3f}"
-    assert run["worst"] == (f"{elbow:.3f} mrad" if elbow > slide else f"{slide:.3f} mm")
+    assert run["RMS over joints [mrad]"] == f"{elbow:.3f}"
+    assert run["RMS over joints [mm]"] == f"{slide:.3f}"
+    assert run["worst joint's RMS"] == (f"{elbow:.3f} mrad" if elbow > slide else f"{slide:.3f} mm")
     assert all(escape(cell) in html_of(found) for cell in table.rows[0])
 
 
@@ -50,7 +50,7 @@ def test_a_fit_that_was_read(loop: Loop) -> None:
     assert "of 2 joints" in repr(stored)
     assert f"mean relative error {stored.error.mean_relative:.2%} on" in repr(stored)
     assert all(escape(name) in html_of(fit) for name in fit.names)
-    assert "Error of the torque on held-out data" in html_of(stored)
+    assert "Torque error on held-out data" in html_of(stored)
     assert ">N</td>" in html_of(stored)  # the slide
 
 
@@ -61,5 +61,5 @@ def test_a_diagnosis_is_told_as_by_the_program() -> None:
     answer = diagnosis_answer(found, "arm.yaml", {"diagnosis": "d.h5", "config": None})
     for part in answer.parts[:-4]:  # but for what the program says of itself
         assert escape(part if isinstance(part, str) else part.title) in html_of(found)
-    assert answer.parts[-2] == Command(("excite", "optimize", "arm.yaml", "--after", "d.h5"))
+    assert answer.parts[-1] == Command(("excite", "optimize", "arm.yaml", "--after", "d.h5"))
     assert answer.data["output"] == {"diagnosis": "d.h5"}

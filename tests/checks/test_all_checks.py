@@ -111,7 +111,7 @@ def test_what_is_declared_is_not_judged(rubbing: Dataset) -> None:
     wrong = changed(rubbing, tau=negative(1))
     message = told(ROBOT, wrong)
     assert f"measurement.sign: {{{name}: -1}}" in message
-    assert f"If that is right as it is, say so: measurement.sign: {{{name}: 1}}." in message
+    assert f"If the config is right, set measurement.sign: {{{name}: 1}}." in message
     assert "measurement.sign" not in told(ROBOT, wrong, with_(sign={name: 1}))
     assert name in told(ROBOT, wrong, with_(sign={other: 1}))
     reversed_ = changed(rubbing, order=np.arange(6)[::-1])
@@ -132,7 +132,7 @@ def test_inertias_of_a_wrist_may_be_anything() -> None:
 def test_all_torques_of_other_sign(rubbing: Dataset) -> None:
     message = told(ROBOT, changed(rubbing, tau=-np.ones(6)))
     assert "torque of every joint has the opposite sign" in message
-    assert "position" not in message.split("As they are")[0].replace("position_sign", "")
+    assert "position" not in message.split("As configured")[0].replace("position_sign", "")
 
 
 ORDERS = {
@@ -148,9 +148,9 @@ def test_torques_in_another_order(rubbing: Dataset, name: str) -> None:
     order = np.array(ORDERS[name])
     message = told(ROBOT, changed(rubbing, order=order))
     moved = [ROBOT.joint_names[j] for j in range(6) if order[j] != j]
-    assert "torques" in message.split("As they are")[0]
+    assert "torques" in message.split("As configured")[0]
     assert all(joint in message for joint in moved)
-    assert "has the opposite sign" not in message.split("As they are")[0]
+    assert "has the opposite sign" not in message.split("As configured")[0]
 
 
 def test_torques_in_another_order_beside_joints_without_any(rubbing: Dataset) -> None:
@@ -163,7 +163,7 @@ def test_torques_in_another_order_beside_joints_without_any(rubbing: Dataset) ->
 
     assert told(ROBOT, without_wrist(rubbing)) == ""
     message = told(ROBOT, without_wrist(changed(rubbing, order=np.array(ORDERS["swap"]))))
-    said = message.split("As they are")[0]
+    said = message.split("As configured")[0]
     names = ROBOT.joint_names
     assert "torques" in said
     assert [name in said for name in names] == [False, True, True, False, False, False]

@@ -20,7 +20,7 @@ _LINK = (
     [
         (2.0, (0.02, 0.02, 0.01), "", ""),
         (2.0, (-0.02, 0.03, 0.03), "fault", "none may be negative"),
-        (2.0, (0.01, 0.01, 0.05), "doubt", "no two may be less than the third"),
+        (2.0, (0.01, 0.01, 0.05), "doubt", "any two must add up to the third"),
         (2.0, (20.0, 20.0, 10.0), "doubt", "a body 6.3 m wide"),
         (0.0, (0.02, 0.02, 0.01), "doubt", "its mass is 0"),
         (0.001, (1e-8, 1e-8, -1e-9), "", ""),  # of a sensor: no torque shows it

@@ -147,7 +147,7 @@ def test_a_mistake_is_told_with_the_keys_that_mend_it(
     for key, value in settings.items():
         assert result.settings[f"measurement.{key}"] == pytest.approx(value, abs=0.016)
     if kind == "torque_sign":
-        assert result.evidence.count("As they are") == 1
+        assert result.evidence.count("As configured") == 1
         assert "As likely" not in result.evidence
 
 

@@ -64,10 +64,10 @@ def test_friction_is_one_share_and_the_rest_is_told_by_place() -> None:
     assert shares(answer) == pytest.approx({"friction": 0.75, "spring": 0.25, "armature": 0.0})
     fall = 0.5 - answer.after.mean_relative_moving
     assert answer_in_words(answer) == (
-        "Friction accounts for 75% of the unmodelled torque, most on elbow (48 N·m at 1 rad/s). "
+        "Friction accounts for 75% of the error reduction, largest on elbow (48 N·m at 1 rad/s). "
         f"On shoulder_pitch: spring at the joint (6.9 kN·m/rad, {0.1 / fall:.0%} of the "
-        "unmodelled torque). Residual 3.6% of the torque, most on slide (10%). "
-        "Next: use the model with its effects (--apply NEW.yaml)."
+        "error reduction). Held-out error 3.6% of torque RMS (mean over joints, where they "
+        "move), largest on slide (10%)."
     )
 
 
@@ -83,15 +83,14 @@ def test_names_that_fit_as_well_are_to_be_told_apart_next() -> None:
     )
     assert told.endswith(
         " Next: a motion that distinguishes spring at the joint of elbow from inertia of the motor "
-        "(armature) (excite optimize … --after)."
+        "(armature)."
     )
 
 
 def test_one_effect_is_told_by_its_name_and_the_rest_by_what_it_depends_on() -> None:
     answer = found(effect("load_dependent_friction", "elbow", RUBS, everywhere(0.4)))
     assert answer_in_words(answer).startswith(
-        "Load-dependent friction of elbow (2 N·m) accounts for nearly all of the unmodelled "
-        "torque. "
+        "Load-dependent friction of elbow (2 N·m) accounts for nearly all of the error reduction. "
     )
     # What stays is told with what it depends on.
     of = (Covariate("position", "elbow", Aspect.HISTORY), Covariate("time"))
@@ -100,8 +99,8 @@ def test_one_effect_is_told_by_its_name_and_the_rest_by_what_it_depends_on() -> 
                    left=(0.1, 0.1))  # fmt: skip
     told = answer_in_words(replace(answer, excess_residuals=(rest,)))
     assert (
-        "Residual 10% of the torque. The residual of elbow depends on history of angle of elbow "
-        "and time. Next: "
+        "Held-out error 10% of torque RMS (mean over joints, where they move). The residual of "
+        "elbow depends on history of angle of elbow and time."
     ) in told
 
 
@@ -153,10 +152,10 @@ def test_what_rests_on_a_weight_is_told_whatever_the_error_does() -> None:
     lower = whole.after.mean_relative_moving - 1e-4
     same = replace(whole, before=replace(whole.after, mean_relative_moving=lower))
     assert answer_in_words(same).startswith(
-        "On elbow: wrong gain of the measured torque (0.04), given the known mass. Residual 3.6% of"
+        "On elbow: wrong gain of the measured torque (0.04), given the known mass. Held-out error "
+        "3.6% of"
     )
-    assert answer_in_words(same).endswith("Next: use the model with its effects "
-                                          "(--apply NEW.yaml).")  # fmt: skip
+    assert "Next:" not in answer_in_words(same)
     rival = replace(gain, aliases=(offset,))
     told = answer_in_words(replace(same, effects=(rival,)))
     assert told.endswith(

@@ -12,13 +12,22 @@ from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.diagnosis.words import changes_in_words
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION
 from excite_cli.measurement.dataset import Dataset
-from tests.diagnosis.simulated_arm import ELBOW, PITCH, SLIDE, YAW, Planted, planted, played, told
+from tests.diagnosis.simulated_arm import (
+    ELBOW,
+    PITCH,
+    SLIDE,
+    YAW,
+    PlantedEffect,
+    planted,
+    played,
+    told,
+)
 
 RUNS = 6
 KINDS = "viscous_friction,coulomb_friction,torque_offset,torque_gain,friction_change,payload"
 
 
-def recorded(*effects: Planted, runs: int = RUNS, **settings: Any) -> Dataset:
+def recorded(*effects: PlantedEffect, runs: int = RUNS, **settings: Any) -> Dataset:
     """With the same dry and viscous friction in all runs, and `effects`."""
     always = [
         planted("coulomb_friction", YAW, 3.0),

@@ -9,19 +9,18 @@ import pytest
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import kind_named
-from tests.diagnosis.simulated_arm import ELBOW, PITCH, Planted, plant, planted, played, told
+from tests.diagnosis.simulated_arm import ELBOW, PITCH, PlantedEffect, plant, planted, played, told
 from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
 
 pytest.importorskip("mujoco")
 
-from benchmarks.battery.history import DahlBySpeed, MaxwellSlip
-from benchmarks.battery.outside import HardeningSpring
+from benchmarks.battery.outside import DahlBySpeed, HardeningSpring, MaxwellSlip
 
 MEANS = {0.0: "coulomb_friction", 1.0: "viscous_friction"}
 
 
-def diagnosed(*effects: Planted) -> Diagnosis:
+def diagnosed(*effects: PlantedEffect) -> Diagnosis:
     """Dry friction of all joints is declared."""
     kinds = (
         "viscous_friction,coulomb_friction,load_dependent_friction,dahl_friction,"
@@ -32,7 +31,7 @@ def diagnosed(*effects: Planted) -> Diagnosis:
     return told(data, kinds, f"effects={declared}")
 
 
-def rubbing(kind: type[Effect], joint: int, size: float, distance: float) -> list[Planted]:
+def rubbing(kind: type[Effect], joint: int, size: float, distance: float) -> list[PlantedEffect]:
     """Dry friction, all of which has a memory, beside that which is declared."""
     dry = planted("coulomb_friction", joint, size)
     return [dry, plant(kind, (joint,), size, {"distance": distance})]

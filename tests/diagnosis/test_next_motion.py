@@ -46,7 +46,10 @@ def separate() -> NextMotion:
 def test_the_motion_tells_the_pair_apart(separate: NextMotion) -> None:
     """Better than one that only excites, and best of all once the solver has worked on it."""
     assert separate.purpose == "separate"
-    assert "separates what the data cannot: viscous_friction on elbow" in separate.messages[0]
+    assert (
+        "separates these indistinguishable effects: viscous_friction on elbow"
+        in separate.messages[0]
+    )
     result = run(separate)
     (motion,) = result.motions
     outlook = separate.outlook([motion.coefficients])
@@ -112,7 +115,7 @@ def test_divergence_so_far_is_that_of_the_rows_themselves(separate: NextMotion) 
 def test_without_aliases_it_excites_on_top_of_the_data() -> None:
     planned = plan_after(make_diagnosis([viscous(), SPRING], ()), smoke_spec(), CONFIG.parent)
     assert planned.purpose == "excite"
-    assert "no effects are indistinguishable" in planned.messages[0]
+    assert "all effects are distinguishable" in planned.messages[0]
     rows = earlier_data([viscous(), SPRING], ()).rows / NOISE * planned.problem.column_scales
     assert np.allclose(planned.prior.factor.T @ planned.prior.factor, rows.T @ rows)
     assert planned.problem.weighting.rows == pytest.approx(np.full(5, 1 / NOISE))

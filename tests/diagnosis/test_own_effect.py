@@ -15,7 +15,7 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION, catalogue, kind_named
 from excite_cli.measurement.dataset import Dataset
-from tests.diagnosis.simulated_arm import ELBOW, ROBOT, Planted, planted, played, told
+from tests.diagnosis.simulated_arm import ELBOW, ROBOT, PlantedEffect, planted, played, told
 from tests.effects import own_package
 
 OWN = "roller_friction"
@@ -37,7 +37,7 @@ def own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[type[Effect]]:
 
 
 @pytest.fixture(scope="module")
-def rollers(own: type[Effect]) -> tuple[Planted, ...]:
+def rollers(own: type[Effect]) -> tuple[PlantedEffect, ...]:
     """Friction on three rollers beside viscous and Coulomb friction."""
     sizes = {"viscous_friction": 4.0, "coulomb_friction": 2.0}
     plain = (planted(kind, ELBOW, size) for kind, size in sizes.items())
@@ -45,7 +45,7 @@ def rollers(own: type[Effect]) -> tuple[Planted, ...]:
 
 
 @pytest.fixture(scope="module")
-def data(rollers: tuple[Planted, ...]) -> Dataset:
+def data(rollers: tuple[PlantedEffect, ...]) -> Dataset:
     return played(rollers)
 
 
@@ -96,7 +96,7 @@ def test_what_it_states_of_itself_keeps_it_out(
 
 def test_its_mechanism_is_in_the_simulated_robot(
     own: type[Effect],
-    rollers: tuple[Planted, ...],
+    rollers: tuple[PlantedEffect, ...],
     data: Dataset,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -32,13 +32,13 @@ pytest.importorskip("mujoco")
 from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
-from tests.diagnosis.simulated_arm import ROBOT, SLIDE, Planted, planted, played
+from tests.diagnosis.simulated_arm import ROBOT, SLIDE, PlantedEffect, planted, played
 
 MASS, CENTRE = 1.8, (0.03, -0.02, 0.06)
 DECLARED = "effects: [{kind: viscous_friction}, {kind: coulomb_friction}]\n"
 
 
-def loaded_arm(*runs: int) -> list[Planted]:
+def loaded_arm(*runs: int) -> list[PlantedEffect]:
     """Friction of all joints, and the load in some runs."""
     kinds = ("viscous_friction", "coulomb_friction")
     friction = [planted(kind, j, 1.0) for kind in kinds for j in range(ROBOT.n)]
@@ -124,7 +124,7 @@ def test_nothing_carried_is_told_as_nothing_and_a_changed_robot_as_that(
     rubbing = replace(last, tau=last.tau + 8.0 * np.sign(last.q - last.q.mean(axis=0)))
     found = identify_load(case, replace(loaded, runs=(rubbing,)), fit)
     assert "more_than_a_load" in {finding.kind for finding in found.findings}
-    assert "more than a payload" in str(load_answer(found).parts[0])
+    assert "more than a rigid payload" in str(load_answer(found).parts[0])
 
 
 def test_gains_that_nobody_told_are_in_the_load(case: Case, runs: Dataset, loaded: Dataset) -> None:

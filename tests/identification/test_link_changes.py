@@ -18,14 +18,14 @@ from excite_cli.summary.identification import (
     link_parts,
 )
 from tests.cli.program import SMOKE
-from tests.diagnosis.simulated_arm import BASE, ROBOT, SLIDE, Planted, planted, simulated
+from tests.diagnosis.simulated_arm import BASE, ROBOT, SLIDE, PlantedEffect, planted, simulated
 
 DECLARED = "[{kind: viscous_friction}, {kind: coulomb_friction}]"
 CAD = standard_parameters(ROBOT)
 TOOL = 1.8  # kg
 
 
-def recorded(error: float, *extra: Planted) -> tuple[Identification, Array]:
+def recorded(error: float, *extra: PlantedEffect) -> tuple[Identification, Array]:
     """What four motions tell, and the robot's own φ."""
     played = simulated(
         extra, (1, 2, 3, 4), 4.0, declared=DECLARED,

@@ -80,8 +80,8 @@ def test_columns_that_nobody_declared_are_told_in_one_note(tmp_path: Path) -> No
     path = csv_with(tmp_path / "log.csv", ambient=rising, mode=["3"] * 400, fan=rising)
     found = only(read(path).findings, "further_columns")
     assert found.severity == "note"
-    assert "ambient, fan" in found.text
-    assert "measurement.covariates: [ambient]" in found.text
+    assert "unused columns: ambient, fan." in found.text
+    assert "measurement.covariates: [NAME]" in found.text
     assert "mode" not in found.text  # it never changes
     assert read(path, covariates=["fan"]).findings == ()
 

@@ -38,7 +38,7 @@ def test_written_data_come_back(tmp_path: Path) -> None:
     path = tmp_path / "new" / "data.h5"
     write_dataset(path, Dataset(JOINTS, (first, second)), {"seed": 3, "effects": ["spring"]})
     data = read(path)
-    assert "further columns: temperature." in only(data.findings, "further_columns").text
+    assert "unused columns: temperature." in only(data.findings, "further_columns").text
     assert [run.name for run in data.runs] == ["a", "b/1"]
     for run, back in zip((first, second), data.runs, strict=True):
         for name in ("t", "q", "tau"):

@@ -41,7 +41,7 @@ def test_gains_that_differ_are_no_clock() -> None:
 def test_a_filter_of_the_speeds_is_told_with_its_time_constant(seconds: float) -> None:
     slow = filtered(recorded(), seconds)
     found = only(check(slow)[1], "lag")
-    assert f"first-order filter of {seconds:.3g} s" in found.text
+    assert f"first-order low-pass of {seconds:.3g} s" in found.text
     assert "not used" in found.text
     assert "{dq: null}" in found.text
     used = only(check(slow, filter={"velocity": "measured"})[1], "lag")

@@ -216,7 +216,7 @@ def test_held_out_blocks_of_a_run_are_shaded(diagnosis: Diagnosis) -> None:
 def test_what_depends_is_told_drawn_and_mapped(sections: dict[str, PageSection]) -> None:
     section = sections["diagnosis-unexplained"]
     told = [b.text for b in section.blocks if isinstance(b, Text)]
-    assert any("60% of its energy is predictable, best from history of angle" in x for x in told)
+    assert any("60% of its variance is predictable, best from history of angle" in x for x in told)
     picture, table = charts_of(section)
     assert "mean forwards" in drawn(picture)
     assert ">30<" in drawn(table).replace("\n", "")
@@ -255,9 +255,9 @@ def test_verdicts_on_held_out_data_stand_in_the_table_and_on_the_card(
     diagnosis: Diagnosis, sections: dict[str, PageSection]
 ) -> None:
     table = next(b for b in sections["diagnosis-found"].blocks if isinstance(b, TableBlock))
-    assert table.rows[0][table.columns.index("held-out")] == "confirmed, 6.00 pp lower"
+    assert table.rows[0][table.columns.index("held-out, without it")] == "confirmed, +6.00 pp"
     (chart,) = charts_of(sections["diagnosis-evidence"])
-    assert "Held-out error: confirmed, 6.00 pp lower." in chart.caption
+    assert "Held-out, without it: confirmed, +6.00 pp." in chart.caption
     assert found_section(diagnosis).lead.count("which took no part, goes from") == 1
 
 
@@ -375,7 +375,7 @@ def test_quantities_in_words(symbol: str, words: str) -> None:
     covariate = Covariate.of_code(symbol)
     assert covariate_in_words(covariate) == words
     found = Approximation((covariate,))
-    assert approximation_in_words(found, covariate_in_words) == f"a function of {words}"
+    assert approximation_in_words(found, covariate_in_words) == f"depends on {words}"
 
 
 def test_a_law_that_jumps_is_drawn_as_a_step_and_a_line_is_not() -> None:

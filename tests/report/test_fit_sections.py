@@ -60,7 +60,7 @@ def test_parameters_are_told_by_form(stored: StoredFit) -> None:
     told = " ".join(chart.alternative for chart in charts)
     assert f"not identifiable: {fit.names[1]}" in told
     words = "".join(chart.svg for chart in charts)
-    for form in ("identifiable", "identifiable, not significant", "not identifiable"):
+    for form in ("identifiable", "identifiable, zero within error", "not identifiable"):
         assert f">{form}<" in words.replace("\n", "")
 
 

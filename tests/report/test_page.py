@@ -67,6 +67,15 @@ def test_tags_match_and_addresses_are_unique(page: str) -> None:
     assert referred <= set(identifiers)
 
 
+def test_blocks_of_every_kind_are_drawn() -> None:
+    """The template knows kinds by the names of their classes."""
+    drawn = render(_page("torque"))
+    plain = render(Page("torque", "", (), (PageSection("one", "torque", ()),)))
+    signs = ("<svg", '<div class="grid">', "<table>", "<details>", "<select>", "<pre")
+    for sign in signs:
+        assert drawn.count(sign) > plain.count(sign), sign
+
+
 def test_nothing_is_loaded_from_elsewhere(page: str) -> None:
     structure = Structure(page)
     assert [tag for tag, _ in structure.elements if tag in ("link", "iframe", "object")] == []

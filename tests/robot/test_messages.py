@@ -65,7 +65,7 @@ def test_unknown_example_robot(wrong: str, nearest: str) -> None:
 
 @pytest.mark.parametrize("name", ["none.urdf", "", "."])
 def test_missing_urdf(tmp_path: Path, name: str) -> None:
-    with pytest.raises(RobotError, match=r"robot.urdf: there is no file .*relative to the YAML"):
+    with pytest.raises(RobotError, match=r"robot.urdf: there is no file .*config relative to it"):
         build_robot(RobotSpec(urdf=name), tmp_path)
 
 

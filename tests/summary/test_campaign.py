@@ -44,5 +44,5 @@ def test_a_round_in_words() -> None:
         "elbow; open: a or b"
     )
     assert round_in_words(2, replace(learned, effects=(), open=())).endswith(
-        "with no effect; nothing is open"
+        "with no effect; no ambiguous effects, nothing left to explain"
     )

@@ -22,7 +22,7 @@ from excite_cli.shown.answer import Table
 from excite_cli.summary.diagnosis import diagnosis_answer
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis
 
-REASON = "a function of v[elbow]"
+REASON = "depends on v[elbow]"
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def test_an_approximation_is_no_name_for_scripts(doubted: Diagnosis) -> None:
 
 def test_an_approximation_has_a_table_of_its_own(doubted: Diagnosis) -> None:
     text = printed(doubted)
-    assert "Surrogate terms (true form unknown)" in text
+    assert "Surrogate terms (they approximate an effect that has no name)" in text
     assert REASON in text
     assert "What the declared model lacks" not in text
     assert "0 effects, 1 surrogate term" in text
@@ -55,8 +55,8 @@ def test_approximations_that_are_not_confirmed_are_one_line(doubted: Diagnosis) 
     first = replace(doubted.effects[0], verdict=HeldOutVerdict.NOT_CONFIRMED)
     found = replace(doubted, effects=(first, *doubted.effects[1:]))
     text = printed(found)
-    assert "In the model, but not confirmed: viscous_friction on elbow (--verbose" in text
-    assert "Surrogate terms" not in text
+    assert "Surrogate terms that are not confirmed: viscous_friction on elbow (--verbose" in text
+    assert "Surrogate terms (" not in text  # no table
     harmful = replace(first, verdict=HeldOutVerdict.HARMFUL)
     told = printed(replace(found, effects=(harmful, *found.effects[1:])))
     assert "viscous_friction on elbow (harmful) (--verbose" in told
@@ -104,7 +104,7 @@ def test_without_repeated_periods_nothing_is_said_of_noise(doubted: Diagnosis) -
 def test_pairs_that_cannot_be_told_from_one_effect() -> None:
     one, other, pair = (EffectRecord(kind, ("elbow",)) for kind in ("spring", "armature", "ripple"))
     found = replace(make_diagnosis(), joint_aliases=(JointAlias((one,), (other, pair)),))
-    told = "spring on elbow indistinguishable from: armature on elbow with ripple on elbow"
+    told = "spring on elbow is indistinguishable from: armature on elbow + ripple on elbow"
     assert told in " ".join(printed(found).split())
     data = diagnosis_answer(found, "arm.yaml", {}).data["joint_aliases"]
     assert data == [
@@ -121,7 +121,10 @@ def test_another_name_of_the_same_torque_is_told_as_such() -> None:
     other = EffectRecord("asymmetric_friction", ("elbow",))
     alias = JointAlias(tuple(parts), (other,))
     found = replace(make_diagnosis(), joint_aliases=(alias,))
-    told = "is the same torque as asymmetric_friction on elbow: no motion distinguishes them"
+    told = (
+        "coulomb_friction on elbow produce the same torque as asymmetric_friction on elbow: no "
+        "motion distinguishes them"
+    )
     assert told in " ".join(printed(found).split())
     (data,) = diagnosis_answer(found, "arm.yaml", {}).data["joint_aliases"]
     assert data["same_torque"]
@@ -140,7 +143,9 @@ def test_nothing_is_missing_only_where_nothing_large_is_left(doubted: Diagnosis)
         assert "elbow" in text
     assert "q[elbow] and load[elbow]" in printed(replace(bare, excess_residuals=(rest,)))
     alone = replace(rest, depends_on=(), predictable=0.0, certain=False, noise=None)
-    assert "the noise level is unknown" in printed(replace(bare, excess_residuals=(alone,)))
+    assert "Residual beside unknown noise: elbow" in printed(
+        replace(bare, excess_residuals=(alone,))
+    )
     assert "coloured noise could be as large" in printed(
         replace(bare, excess_residuals=(replace(alone, noise=0.1),))
     )
@@ -208,7 +213,7 @@ def test_every_effect_shows_what_it_is_worth_on_held_out_data(
 ) -> None:
     """In percentage points where it is most; a harmful effect is never too small to be shown."""
     text = printed(bad)
-    assert "- harmful, 40.00 pp higher\n" in text
+    assert "harmful, -40.00 pp\n" in text
     assert "small effects" not in text  # of an error that did not fall, nothing is
     tiny = dict.fromkeys(bad.joint_names, 1e-4)
     folded = [*bad.effects[:1], *(replace(each, parts=tiny) for each in bad.effects[1:])]
@@ -216,10 +221,10 @@ def test_every_effect_shows_what_it_is_worth_on_held_out_data(
     text = printed(replace(fell, after=replace(fell.after, mean_relative_moving=0.1)))
     assert "2 small effects (each below 1% of the error reduction)" in text
     assert "viscous_friction on elbow (not confirmed)" in text
-    assert "- harmful, 40.00 pp higher\n" in text  # whatever it takes off
+    assert "harmful, -40.00 pp\n" in text  # whatever it takes off
     elsewhere = replace(bad.effects[0], removes={"slide": ErrorReduction(0.01, 0.02, 0.1)})
-    assert "harmful, 2.00 pp lower on slide\n" in printed(replace(bad, effects=(elsewhere,)))
-    assert "confirmed, 6.00 pp lower a function of v[elbow]" in printed(doubted)
+    assert "harmful, +2.00 pp on slide\n" in printed(replace(bad, effects=(elsewhere,)))
+    assert "confirmed, +6.00 pp depends on v[elbow]" in printed(doubted)
     older = replace(bad.effects[0], verdict=None, removes={})
     assert " pp" not in printed(replace(bad, effects=(older,)))
 
@@ -231,7 +236,7 @@ def test_scripts_see_verdicts_and_the_untouched_urdf(bad: Diagnosis) -> None:
     assert effect["removes"]["elbow"] == {"relative": -0.3, "relative_moving": -0.4, "rms": -2.0}
     assert data["error"]["untouched"]["mean_relative"] == 0.5
     assert data["error"]["samples"]["elbow"] == 80
-    assert "joint URDF before" in printed(bad)
+    assert "joint URDF declared" in printed(bad)
     assert "61.00%" in printed(bad)
     unknown = replace(bad, untouched=None)
     assert diagnosis_answer(unknown, "arm.yaml", {}).data["error"]["untouched"] is None
@@ -311,10 +316,10 @@ def test_what_inertias_take_up_is_told_with_what_settles_it(weighed: Diagnosis) 
     kinds = ("torque_gain", "armature", "torque_gain", "wrench_gain", "kind_of_a_package")
     absorbed = tuple(ConfoundedCandidate(kind, ("elbow",), ("Izz[elbow]",), 0.0) for kind in kinds)
     text = printed(replace(weighed, effects=(), absorbed=absorbed))
-    told = [line for line in text.splitlines() if " is identifiable with " in line]
+    told = [line for line in text.splitlines() if " becomes identifiable if " in line]
     assert [line.split()[0] for line in told] == ["torque_gain", "wrench_gain"]
     assert "identification.known_payload" in told[0]
     assert "identification.total_mass" in told[1]
-    assert " is identifiable with " not in printed(
+    assert " becomes identifiable if " not in printed(
         replace(weighed, absorbed=absorbed)
     )  # weighed already
