@@ -11,7 +11,7 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 # A config with some values changed, its comments and order kept.
 
-_amended_WIDTH = 100
+_LINE_WIDTH = 100
 
 
 def amended(text: str, settings: Mapping[str, Any]) -> str:
@@ -22,7 +22,7 @@ def amended(text: str, settings: Mapping[str, Any]) -> str:
     yaml = YAML()
     yaml.preserve_quotes = True
     yaml.brace_single_entry_mapping_in_flow_sequence = True
-    yaml.width = _amended_WIDTH
+    yaml.width = _LINE_WIDTH
     tree = yaml.load(text)
     for path, value in settings.items():
         *above, key = path.split(".")

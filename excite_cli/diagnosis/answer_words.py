@@ -96,9 +96,7 @@ def _missing(found: Diagnosis) -> str:
         what = f"{title_of(each.effect.kind)} ({_first(each)}{share})"
         said.append(f"On {_place(each, found)}: {what}.")
     if not said:
-        said.append(
-            f"Your model lacks {counted(len(found.effects), 'effect')}, none of them large."
-        )
+        said.append(f"Your model lacks {counted(len(found.effects), 'small effect')}.")
     elif of_all.get(INERTIAS, 0.0) >= _WORTH_SAYING:
         said.append(f"Inertias that differ from the URDF account for {of_all[INERTIAS]:.0%}.")
     return " ".join(said)
@@ -181,7 +179,7 @@ def _left(found: Diagnosis) -> list[str]:
 
 
 def _next(found: Diagnosis) -> str:
-    """What to do: tell apart what fits as well, by a motion, or go on with what was found."""
+    """What to do first: resolve doubts of the set-up, or distinguish what fits as well."""
     if not found.effects:
         return ""
     if any(each.kind == OPEN_SETUP for each in found.findings):

@@ -42,7 +42,7 @@ from excite_cli.workers.context import each
 # Positions one period apart differ by less than this share of their range.
 _ALIKE = 0.02
 # A lag counts if at least this share of the known samples has a partner.
-_exact_period_FEWEST = 1 / 8
+_LEAST_SHARE = 1 / 8
 _STEPS = 4
 _MULTIPLES = 8  # periods that are looked at in a step, farther away from step to step
 _SLOPE = 200  # parts of a period over which a speed is taken
@@ -88,7 +88,7 @@ def _apart(x: Array, known: NDArray[np.bool_]) -> Array:
     lags = slice(0, (size + longest_gap) // 2 + 1)
     total = np.fft.irfft(spectrum)[lags]
     pairs = np.fft.irfft(np.square(np.abs(mask)))[lags]
-    enough = pairs > max(_exact_period_FEWEST * weight.sum(), 1.0)
+    enough = pairs > max(_LEAST_SHARE * weight.sum(), 1.0)
     return np.where(enough, total / np.maximum(pairs, 1.0) / x.shape[1], np.inf)
 
 

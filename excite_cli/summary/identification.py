@@ -179,7 +179,7 @@ def _error_table(found: Identification | StoredFit) -> Table:
         for joint, unit in zip(joints, units, strict=True)
         if not isnan(error.rms[joint])  # its torque was not measured
     )
-    title = "Torque error on held-out data (RMS: of all samples, filtered, and as recorded)"
+    title = "Error of the torque on held-out data (RMS: of all samples, filtered, and as recorded)"
     names = (
         "joint", "error, moving", "error, all", "RMS", *floor_columns(floor), "RMS unfiltered",
         "unit", "training error",

@@ -65,7 +65,7 @@ def test_every_output_is_written_can_be_used_and_exported_again(
     shutil.copy(folder / CONFIG, excite.folder)
     words += ["--held-out", "r1", "--overwrite"]
     run = excite.good("identify", CONFIG, folder / "data.h5", *words)
-    assert "Torque error" in run.stdout
+    assert "Error of the torque" in run.stdout
     assert "identifiable" in run.stdout
     with h5py.File(excite.folder / "fit.h5") as file:
         assert file.attrs["held_out_run"] == "r1"

@@ -123,7 +123,7 @@ def test_nothing_and_nothing_good() -> None:
     assert shares(worse) == {}
     # Files of earlier versions know no parts.
     assert shares(PLAIN) == {}
-    assert answer_in_words(PLAIN).startswith("Your model lacks 1 effect, none of them large.")
+    assert answer_in_words(PLAIN).startswith("Your model lacks 1 small effect.")
 
 
 def test_what_lowers_nothing_is_told_so_with_the_warnings() -> None:
