@@ -279,7 +279,7 @@ def _all_broken(task: MotionTask, posture: Array) -> str:
 # would be drawn about) until every residual is clear: the solver starts from inside.
 
 # Residuals that the start must have, or this share of the room where it is drawn to.
-_CLEAR, _SHARE_OF_ROOM = 0.01, 0.5
+_CLEAR, _ROOM_OF_GIVEN = 0.01, 0.5
 _SHARES = np.concatenate([[1.0, 0.99], np.geomspace(0.97, 1e-3, 60)])
 _SAME_DURATION = 1e-6
 _TOLD_MISFIT = 1e-4
@@ -303,7 +303,7 @@ def start_from(task: MotionTask, start: Start, given: Segment) -> tuple[Array, s
     fitted = basis.position @ task.coefficients(x)
     misfit = float(np.sqrt(np.mean((fitted - wanted) ** 2, axis=0)).max())
     anchor = _anchor(task, start, fitted.mean(axis=0))
-    clear = min(_CLEAR, _SHARE_OF_ROOM * _room(task, anchor))
+    clear = min(_CLEAR, _ROOM_OF_GIVEN * _room(task, anchor))
     for share in _SHARES:
         candidate = anchor + share * (x - anchor)
         if _room(task, candidate) > clear:

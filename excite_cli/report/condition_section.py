@@ -27,7 +27,7 @@ from excite_cli.trajectory.fade import Segment
 # Seen from afar a capsule is a thick line with round ends, so that the drawing is a few lines of
 # SVG in the page's own colours, needs no mesh and shows what the constraints see.
 
-_WIDTH, _HEIGHT, _MARGIN = 284.0, 210.0, 8.0  # pt
+_WIDTH, _POSTURE_HEIGHT, _MARGIN = 284.0, 210.0, 8.0  # pt
 _THIN = 0.012  # [m] radius of a line between joints, where there are no capsules
 _EDGES = [(i, j) for i in range(8) for j in range(i) if (i ^ j).bit_count() == 1]
 
@@ -106,10 +106,10 @@ def _drawn(sticks: list[_Stick], boxes: list[Array], near: NearestBodies | None)
     corners = [side_view(box)[0] for box in boxes]
     every = np.vstack([reach.reshape(-1, 2), *corners])
     low, size = every.min(axis=0), np.ptp(every, axis=0)
-    room = np.array([_WIDTH, _HEIGHT]) - 2 * _MARGIN
+    room = np.array([_WIDTH, _POSTURE_HEIGHT]) - 2 * _MARGIN
     scale = float((room / np.maximum(size, 1e-9)).min())
     shift = _MARGIN + (room - size * scale) / 2 - low * scale
-    parts = [f'<svg viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}">']
+    parts = [f'<svg viewBox="0 0 {_WIDTH:g} {_POSTURE_HEIGHT:g}">']
     for box in corners:
         placed = box * scale + shift
         parts += [_line(placed[i], placed[j], 0.8, "var(--muted)") for i, j in _EDGES]

@@ -50,7 +50,7 @@ def test_a_fit_that_was_read(loop: Loop) -> None:
     assert "of 2 joints" in repr(stored)
     assert f"mean relative error {stored.error.mean_relative:.2%} on" in repr(stored)
     assert all(escape(name) in html_of(fit) for name in fit.names)
-    assert "Torque error on held-out data" in html_of(stored)
+    assert "Error of the torque on held-out data" in html_of(stored)
     assert ">N</td>" in html_of(stored)  # the slide
 
 

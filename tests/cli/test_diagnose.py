@@ -291,7 +291,7 @@ def test_a_joint_without_torque_is_left_out_and_the_others_are_found(
     fitted = excite.answer("identify", SMOKE, path, *without)
     assert fitted["error"]["rms_raw"]["wrist_roll"] is None
     table = excite("identify", SMOKE, path, *without).stdout
-    assert "Torque error on held-out data" in table
+    assert "Error of the torque on held-out data" in table
     assert not [line for line in table.splitlines() if line.startswith("wrist_roll ")]
 
 
