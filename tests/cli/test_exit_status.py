@@ -26,7 +26,7 @@ def test_a_bug_says_how_to_report_it(
     monkeypatch.setattr(sys, "argv", ["excite", "optimize"])
     assert run_guarded(fail) == BUG
     told = capsys.readouterr().err
-    assert "a bug of excite, not of your input (ZeroDivisionError at test_ending.py:" in told
+    assert "a bug of excite, not of your input (ZeroDivisionError at test_exit_status.py:" in told
     assert "--verbose" in told
     assert "Traceback" not in told
     monkeypatch.setattr(sys, "argv", ["excite", "optimize", "--verbose"])
