@@ -191,7 +191,7 @@ def approximation_in_words(
 ) -> str:
     """What an effect only comes near; covariates as `say` puts them."""
     if found.covariates:
-        return f"depends on {', '.join(map(say, found.covariates))}"
+        return f"a function of {', '.join(map(say, found.covariates))}"
     if not found.kind:
         return "explained only in part"
     return f"resembles {title_of(found.kind)}"
@@ -208,17 +208,23 @@ def rests_in_words(
     perhaps: dict[tuple[str, str], list[str]] = {each: [] for each in _PERHAPS}
     for rest in found.excess_residuals:
         left = (
-            f"{rest.joint} {rest.rms:.3g} {units[rest.joint]} RMS ({rest.share_of_torque:.1%} of "
-            "its torque in the training data)"
+            f"{rest.joint} {rest.rms:.3g}{_unit(units[rest.joint])} RMS "
+            f"({rest.share_of_torque:.1%} of its torque in the training data)"
         )
         if rest.certain:
-            noise = "" if rest.noise is None else f", noise {rest.noise:.3g} {units[rest.joint]}"
+            noise = (
+                "" if rest.noise is None else f", noise {rest.noise:.3g}{_unit(units[rest.joint])}"
+            )
             more.append(f"Residual above noise: {left}{noise}; {_predicted(rest, say)}.")
         else:
             why = 2 if rest.at_reversals else int(rest.noise is None)
             perhaps[_PERHAPS[why]].append(left)
     said = [f"{what}: {', '.join(left)}; {why}." for (what, why), left in perhaps.items() if left]
     return more, said
+
+
+def _unit(unit: str) -> str:
+    return f" {unit}" if unit else ""
 
 
 def _predicted(rest: ExcessResidual, say: Callable[[Covariate], str]) -> str:

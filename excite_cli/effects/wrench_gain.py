@@ -18,7 +18,7 @@ class WrenchGain(TorqueGain):
     scope: ClassVar = "base"
     on_base: ClassVar = False
     identified_by: ClassVar = (
-        "the known robot mass (identification.total_mass) or a known payload on a run "
+        "the robot's mass is known (identification.total_mass), or one run carries a known payload "
         "(identification.known_payload)"
     )
     can_appear_later: ClassVar = True

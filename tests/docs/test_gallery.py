@@ -50,8 +50,10 @@ def test_what_is_left_is_said_of_every_joint() -> None:
     moving = {**found.after.relative_moving, "elbow": 0.123, "slide": float("nan")}
     left = left_of(replace(found, after=replace(found.after, relative_moving=moving)))
     assert tuple(left) == found.joint_names
-    assert left["elbow"].startswith("12.3% of its torque is left where it moves. Excess residual: ")
-    assert "Excess residual: elbow 0.8" in left["elbow"]
+    assert left["elbow"].startswith(
+        "12.3% of its torque is left where it moves. Residual above noise: "
+    )
+    assert "Residual above noise: elbow 0.8" in left["elbow"]
     assert left["slide"].startswith("it does not move in the held-out data")
     quiet = next(j for j in found.joint_names if j not in {"elbow", "slide"}
                  and j not in {each.joint for each in found.excess_residuals})  # fmt: skip

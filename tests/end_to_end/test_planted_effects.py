@@ -113,7 +113,7 @@ def test_the_next_motion_settles_what_the_first_left_open(
         "optimize", SMOKE, "--after", "diagnosis.h5", "-o", "next.h5", "--motions", "1", *brief
     )
     assert run.returncode == 0, run.stderr
-    assert f"separates what the data cannot: {named[0]} on elbow / " in run.stderr
+    assert f"separates these indistinguishable effects: {named[0]} on elbow / " in run.stderr
 
     excite.answer("simulate", SMOKE, "next.h5", "-o", "second.h5", *robot)
     files = ("first.h5", "second.h5", "--held-out", "motion_1_take_3")

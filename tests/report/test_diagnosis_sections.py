@@ -375,7 +375,7 @@ def test_quantities_in_words(symbol: str, words: str) -> None:
     covariate = Covariate.of_code(symbol)
     assert covariate_in_words(covariate) == words
     found = Approximation((covariate,))
-    assert approximation_in_words(found, covariate_in_words) == f"depends on {words}"
+    assert approximation_in_words(found, covariate_in_words) == f"a function of {words}"
 
 
 def test_a_law_that_jumps_is_drawn_as_a_step_and_a_line_is_not() -> None:

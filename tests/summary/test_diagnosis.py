@@ -22,7 +22,7 @@ from excite_cli.shown.answer import Table
 from excite_cli.summary.diagnosis import diagnosis_answer
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis
 
-REASON = "depends on v[elbow]"
+REASON = "a function of v[elbow]"
 
 
 @pytest.fixture(scope="module")
@@ -224,7 +224,7 @@ def test_every_effect_shows_what_it_is_worth_on_held_out_data(
     assert "harmful, -40.00 pp\n" in text  # whatever it takes off
     elsewhere = replace(bad.effects[0], removes={"slide": ErrorReduction(0.01, 0.02, 0.1)})
     assert "harmful, +2.00 pp on slide\n" in printed(replace(bad, effects=(elsewhere,)))
-    assert "confirmed, +6.00 pp depends on v[elbow]" in printed(doubted)
+    assert "confirmed, +6.00 pp a function of v[elbow]" in printed(doubted)
     older = replace(bad.effects[0], verdict=None, removes={})
     assert " pp" not in printed(replace(bad, effects=(older,)))
 
