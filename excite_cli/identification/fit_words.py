@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from enum import StrEnum
 from statistics import median
 
 from excite_cli.identification.errors_of_torque import Errors
@@ -10,11 +11,19 @@ from excite_cli.identification.fit import Fit
 _STANDS_OUT = 1.5  # times the typical joint
 
 
-def fixed_by_data(fit: Fit, i: int) -> str:
-    """`yes`, `yes (zero within error)` (the fit is as good without it) or `NO`."""
+class Identifiable(StrEnum):
+    """Whether the data determine a parameter; without one that is `ZERO` the fit is as good."""
+
+    YES = "yes"
+    ZERO = "yes (zero within error)"
+    NO = "NO"
+
+
+def fixed_by_data(fit: Fit, i: int) -> Identifiable:
+    """Of parameter i of a fit."""
     if not fit.identifiable[i]:
-        return "NO"
-    return "yes" if fit.essential[i] else "yes (zero within error)"
+        return Identifiable.NO
+    return Identifiable.YES if fit.essential[i] else Identifiable.ZERO
 
 
 def relative_in_words(share: float) -> str:

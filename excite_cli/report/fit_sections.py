@@ -6,6 +6,7 @@ import numpy as np
 
 from excite_cli.identification.fit import Fit
 from excite_cli.identification.fit_words import (
+    Identifiable,
     consistency_in_words,
     fixed_by_data,
     relative_in_words,
@@ -22,10 +23,10 @@ from excite_cli.report.rows_chart import Axis, Bar, Form, Mark, Row, rows_chart
 # Parameters of a fit with their intervals; the marker says how well the data fix each.
 
 _MOST_ROWS = 16
-_FORMS: dict[str, tuple[str, Form, Colour]] = {
-    "yes": ("identifiable", "dot", "blue"),
-    "yes (zero within error)": ("identifiable, zero within error", "ring", "blue"),
-    "NO": ("not identifiable", "cross", "vermilion"),
+_FORMS: dict[Identifiable, tuple[str, Form, Colour]] = {
+    Identifiable.YES: ("identifiable", "dot", "blue"),
+    Identifiable.ZERO: ("identifiable, zero within error", "ring", "blue"),
+    Identifiable.NO: ("not identifiable", "cross", "vermilion"),
 }
 
 
