@@ -17,8 +17,9 @@ def load_answer(found: LoadIdentification) -> Answer:
 def load_parts(found: LoadIdentification) -> Parts:
     """A sentence, the ten parameters, and errors per joint."""
     rows = tuple(
-        (name, with_deviation(each.value, each.std), each.unit)
+        (name, with_deviation(scale * each.value, scale * each.std), unit)
         for name, each in found.parameters.items()
+        for scale, unit in [(1e3, "mm") if each.unit == "m" else (1.0, each.unit)]
     )
     title = (
         f"Load on {found.link}, in its frame (± one standard deviation; inertia about the centre)"
