@@ -164,3 +164,23 @@ def test_one_recording_asks_for_more() -> None:
     one = alone(given, np.zeros(len(FOLDS) * SAMPLES))
     several = models_of(given).difference([], [0]).confidence
     assert models_of(one).difference([], [0]).confidence > several
+
+
+def test_a_quarter_of_the_travel_is_left_out_whenever_the_joint_is_there() -> None:
+    """Not a quarter of the time: the seconds in the last quarter are all over the recording."""
+    given = traced_of([(effect("payload"), 0.5)])
+    place = 7 * np.arange(32) % 32  # of every second
+    there = np.split(np.repeat(place >= 24, 50)[:, None, None], len(FOLDS))
+    (candidate,) = given.candidates
+    columns = tuple(c * here for c, here in zip(candidate.columns, there, strict=True))
+    tau = tuple(
+        t - 0.5 * (c - own).sum(axis=2)
+        for t, c, own in zip(given.data.tau, candidate.columns, columns, strict=True)
+    )
+    given = replace(
+        given,
+        data=replace(given.data, tau=tau),
+        candidates=(replace(candidate, columns=columns),),
+    )
+    found = models_of(alone(given, np.repeat(place / 32, 50))).difference([], [0])
+    assert found.size < 1.0

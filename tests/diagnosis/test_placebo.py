@@ -90,3 +90,10 @@ def test_an_effect_that_is_in_the_model_is_not_in_the_residual() -> None:
     without = placebos_of(data, candidates, (), noise, white).inflation
     assert without > 50
     assert placebos_of(data, candidates, (0,), noise, white).inflation < 1.7
+
+
+def test_the_inflation_is_that_of_the_variance() -> None:
+    """Noise of one that is taken for a half: every χ² is four times too large."""
+    half = NoiseModel.white(np.full(2, 0.5))
+    found = [inflation(*data_with_memory(0.0, seed), half) for seed in range(12)]
+    assert np.mean(found) == pytest.approx(4.0, rel=0.2)

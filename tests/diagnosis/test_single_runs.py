@@ -71,3 +71,11 @@ def test_by_what_two_recordings_differ_is_told_in_one_line() -> None:
     # What is chance is not told nor what parts of one recording differ by.
     assert differences_between_runs(two_recordings(0.0)) == ()
     assert differences_between_runs(two_recordings(5.0, ("a", "a"))) == ()
+
+
+def test_every_held_out_run_must_be_declared() -> None:
+    effect = kind_named("contact")((0, 1), {"start": 0.1, "end": 0.4}, ("only",))
+    held_out = run("other"), run("third")
+    parts = Split((run("only", block=1),), held_out, "other", (0,), ("only",))
+    (found,) = assumptions([effect], parts, model(other={"contact": "none"}))
+    assert found.kind == "contact"

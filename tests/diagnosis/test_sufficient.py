@@ -121,3 +121,12 @@ def test_what_is_not_of_every_robot_is_left_alone_and_one_of_two_alike_leaves() 
     rotors = [kind("coulomb_friction"), kind("armature"), kind("armature")]
     twice = found_with(seen, rotors, noisy(seen, 1.0, 0.1), 0.1)
     assert len(those_that_matter(replace(twice, chosen=(0, 1, 2)), (0, 1, 2))) == 2
+
+
+def test_what_tests_promise_too_much_makes_sizes_less_sure() -> None:
+    """A rotor that surely is next to nothing perhaps is not where errors are that much larger."""
+    seen = crept(FAST)
+    both = [kind("coulomb_friction"), kind("armature")]
+    given = found_with(seen, both, noisy(seen, 0.003, 0.1), 0.1)
+    assert with_everyday(given, [0]) == [0]
+    assert with_everyday(replace(given, inflation=1e3), [0]) == [0, 1]

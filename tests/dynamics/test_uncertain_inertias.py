@@ -264,3 +264,12 @@ def test_bodies_are_named_by_joint_link_or_base() -> None:
         exact_ones(arm, "elbow_join")
     with pytest.raises(ConfigError, match=r"'wrist_2_joint'. It is locked.* Bodies: base, elbow"):
         exact_ones(arm, "wrist_2_joint")
+
+
+def test_of_an_improper_quotient_the_least_over_the_floor_stands() -> None:
+    admitted = InertiaUncertainty((Piece(np.ones(2), np.array([0.5, 2.0]), np.zeros((0, 2))),))
+    found = least_ratios(
+        admitted, np.eye(2)[None], np.array([[1.0, 0.0]]), np.array([0.0, 1.0]), 0.05
+    )
+    assert not found.proper.any()
+    assert found.values == pytest.approx(np.array([[0.5 / 0.05]]))

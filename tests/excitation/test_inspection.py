@@ -4,6 +4,8 @@ certificates in odd cases, and the instant at which something is nearest.
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -254,3 +256,20 @@ def test_without_distances_it_is_the_start_and_nothing_is_near() -> None:
     states = States(problem.kinematics, *at)
     margins = [constraint.margins(states) for constraint in problem.constraints]
     assert nearest_bodies(problem, Poses.of(problem.robot, states.q), margins) is None
+
+
+def test_of_several_distances_the_least_counts() -> None:
+    t = np.linspace(0.0, 1.0, 101)
+    kept = [2.0 - t, 1.0 + 4.0 * np.square(t - 0.25) - 0.5]  # least: 1 at the end, 0.5 at 0.25
+    constraints = [
+        SimpleNamespace(
+            margins=lambda states, m=m: m[:, None], drawing=SimpleNamespace(capsules=True)
+        )
+        for m in kept
+    ]
+    trajectory = SimpleNamespace(
+        duration=1.0, states=lambda times, coefficients: (times[:, None],) * 3
+    )
+    problem: Any = SimpleNamespace(kinematics=None, constraints=constraints)
+    segment: Any = SimpleNamespace(trajectory=trajectory, coefficients=None)
+    assert closest_time(problem, segment) == pytest.approx(0.25)

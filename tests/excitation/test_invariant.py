@@ -152,3 +152,16 @@ def test_earlier_motions_count_as_much_as_on_the_samples() -> None:
     stack = Stack.empty(problem.columns).with_rows(problem.objective().block(first))
     coarse = problem.objective(stack).stacked_condition_number(second)
     assert dense_condition_number(problem, stack, second) == pytest.approx(coarse, rel=0.01)
+
+
+def test_the_deviation_does_not_depend_on_how_columns_are_scaled() -> None:
+    plain, scaled = (
+        smoke(f"criterion.column_scaling={each}", "effects=null") for each in ("none", "unit_norm")
+    )
+    one, other = (
+        invariants(
+            each, Stack.empty(each.columns).with_rows(each.objective().block(drawn(each, 0.3, 1)))
+        )
+        for each in (plain, scaled)
+    )
+    assert one.torque_deviation == pytest.approx(other.torque_deviation, rel=1e-9)

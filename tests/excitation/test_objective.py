@@ -441,3 +441,19 @@ def test_how_many_motions_it_takes() -> None:
     assert divergences((count - 1) * motion, directions).min() < SEPARATED
     assert motions_needed(nothing, 1e-9 * motion, directions) is None
     assert motions_needed(nothing, 1e6 * motion, directions) == 1
+
+
+def test_columns_of_unit_norm_have_it() -> None:
+    problem = smoke()
+    robot, base = problem.robot, problem.base
+    scales = build_weighting(CriterionSpec(column_scaling="unit_norm"), robot, base).columns
+    y = Regressor(robot).evaluate(*robot.draw_states(200, 0))[:, :, base.selection] * scales
+    assert np.square(y).sum(axis=1).mean(axis=0) == pytest.approx(np.ones(base.rank))
+
+
+def test_a_stack_with_another_has_the_rows_of_both() -> None:
+    rows = np.random.default_rng(0).normal(size=(30, 3))
+    one, other = (Stack.empty(3).with_rows(part) for part in (rows[:10], rows[10:]))
+    both = one.with_stack(other)
+    assert both.rows == 30
+    assert both.factor.T @ both.factor == pytest.approx(rows.T @ rows)

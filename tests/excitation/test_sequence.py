@@ -23,7 +23,7 @@ from excite_cli.excitation.motion import Motion, Outcome
 from excite_cli.excitation.one_start import FoundMotion, StartContext
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Figure, Progress, ProgressMeasure, Status
-from excite_cli.excitation.random_baseline import RandomBaseline, random_baseline
+from excite_cli.excitation.random_baseline import RandomBaseline, _select, random_baseline
 from excite_cli.excitation.solvers.base import Effort
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
 from excite_cli.excitation.stack import Stack
@@ -279,3 +279,18 @@ def test_without_an_admissible_point_nothing_is_stored(
     with pytest.raises(KeyboardInterrupt):
         plan(slow(), output=tmp_path / "cut.h5")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_other_motion_in_place_of_a_selected_one_is_better(seed: int) -> None:
+    blocks = np.random.default_rng(seed).normal(size=(30, 5, 4)) * [1.0, 2.0, 0.3, 0.1]
+    grams = blocks.swapaxes(1, 2) @ blocks
+
+    def condition(some: list[int]) -> float:
+        return float(np.linalg.cond(np.vstack(blocks[some])))
+
+    chosen = _select(grams, np.zeros((4, 4)), 4)
+    own = condition(chosen)
+    for slot in range(4):
+        for other in range(30):
+            assert own <= condition([*chosen[:slot], other, *chosen[slot + 1 :]]) * (1 + 1e-6)

@@ -10,6 +10,7 @@ import pytest
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Run, joined, merged
+from excite_cli.measurement.missing_values import without_missing
 from excite_cli.measurement.quality import mask_saturated, raise_for_errors, sentence, unwrapped
 from excite_cli.measurement.recording_limits import RecordingLimits
 from excite_cli.measurement.resolution import lattice_step
@@ -414,3 +415,20 @@ def test_settings_of_both_hold_and_numbers_are_those_of_the_later() -> None:
         "robot.base_orientation": [0.2, 0.0, 0.0],
         "measurement.without_torque": ["a", "b"],
     }
+
+
+def test_counts_of_an_encoder_are_told_with_their_number_a_turn() -> None:
+    run = without_speed(recorded())
+    unit = 2 * np.pi / 2**12
+    q = run.q * 2.5 / np.abs(run.q).max()  # twice as much would not keep the limits
+    found = only(check(replace(run, q=np.round(q / unit)))[1], "units")
+    assert found.settings == {"measurement.angle": pytest.approx(unit)}
+    assert "With 4096 a turn" in found.text
+
+
+def test_what_was_masked_before_stays_so_where_torques_are_missing() -> None:
+    run = recorded()
+    tau, valid = run.tau.copy(), np.ones(run.tau.shape, bool)
+    tau[7, 0], valid[3, 1] = np.nan, False
+    back, _ = without_missing(replace(run, tau=tau, valid=valid), JOINTS)
+    assert np.argwhere(~back.usable()).tolist() == [[3, 1], [7, 0]]

@@ -113,3 +113,13 @@ def test_what_moves_and_what_only_flickers() -> None:
     wave, noise = np.sin(2 * np.pi * k / 15), rng.normal(size=len(k))
     assert both_move(wave, noise, 0.0 * k) == [True, False, False]
     assert moves(np.zeros((1, 2)), 0, 1).tolist() == [False, False]  # of one sample
+
+
+@pytest.mark.parametrize(("samples", "told"), [(50, []), (150, ["stuck"])])
+def test_a_torque_that_stands_for_less_than_a_tenth_of_a_second_is_none(
+    samples: int, told: list[str]
+) -> None:
+    run = recorded(rate=1000.0)
+    tau = run.tau.copy()
+    tau[3000 : 3000 + samples, 1] = tau[3000, 1]
+    assert [found.kind for found in mask_stuck(replace(run, tau=tau), JOINTS)[1]] == told

@@ -9,7 +9,7 @@ import pytest
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import ConfigError
 from excite_cli.measurement.dataset import Run
-from excite_cli.measurement.torque import check_joints, declared, to_joints
+from excite_cli.measurement.torque import check_joints, declared, in_step, to_joints
 from tests.measurement.recordings import JOINTS, recorded
 
 TURNS = np.array([True, True, False])
@@ -101,3 +101,13 @@ def test_declarations_that_do_not_fit(spec: dict[str, Any], parts: tuple[str, ..
 def test_declarations_that_contradict_themselves(spec: dict[str, Any], text: str) -> None:
     told = declared(MeasurementSpec(**spec), JOINTS)
     assert [text in found.text for found in told] == [True] * bool(text)
+
+
+@pytest.mark.parametrize("begin", [0.0, 5.0])
+def test_what_is_masked_moves_with_its_torque(begin: float) -> None:
+    run = recorded()
+    valid = np.ones(run.tau.shape, bool)
+    valid[100, 1] = False
+    back = in_step(replace(run, t=run.t + begin, valid=valid), 0.1)
+    assert np.argwhere(~back.usable()).tolist() == [[80, 1]]
+    np.testing.assert_allclose(back.tau[:-20], run.tau[20:], atol=1e-9)
