@@ -19,7 +19,7 @@ from excite_cli.diagnosis.held_out_errors import HeldOutRuns
 from excite_cli.diagnosis.held_out_verdict import worth_beside
 from excite_cli.diagnosis.modelled_run import places_of
 from excite_cli.diagnosis.records import FrictionLine, by_joint
-from excite_cli.diagnosis.search_loop import SearchResult
+from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.effects.catalogue import straight_friction
 from excite_cli.effects.parameter import Value, deviation
 from excite_cli.identification.identified_model import Prediction

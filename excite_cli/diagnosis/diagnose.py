@@ -41,7 +41,8 @@ from excite_cli.diagnosis.records import (
     Textbook,
     by_joint,
 )
-from excite_cli.diagnosis.search_loop import SearchResult, trace
+from excite_cli.diagnosis.search_loop import trace
+from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.diagnosis.single_runs import (
     assumptions,
     differences_between_runs,

@@ -13,7 +13,7 @@ import numpy as np
 from excite_cli.diagnosis.noise_spectrum import band_noise
 from excite_cli.diagnosis.records import ExcessResidual
 from excite_cli.diagnosis.residual_predictability import Quantities, Structure
-from excite_cli.diagnosis.search_loop import SearchResult
+from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.diagnosis.traces import Dependence
 from excite_cli.identification.noise_floor import NoiseFloor
 from excite_cli.identification.processing import Processing

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.diagnosis.modelled_run import places_of, width_of
-from excite_cli.diagnosis.search_loop import SearchResult
+from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.dynamics.nearest_inertias import half_of
 from excite_cli.identification.factors import Mask
 from excite_cli.identification.fit import usual_sizes

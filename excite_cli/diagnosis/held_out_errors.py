@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.diagnosis.modelled_run import places_of, width_of
-from excite_cli.diagnosis.search_loop import SearchResult
+from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.catalogue import urdf_friction

@@ -18,7 +18,7 @@ import numpy as np
 from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.held_out_errors import HeldOutRuns, refitted
 from excite_cli.diagnosis.records import ErrorReduction
-from excite_cli.diagnosis.search_loop import SearchResult
+from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.diagnosis.textbook import everyday
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.identification.errors_of_torque import Errors, block_sums, drawn_blocks

@@ -268,7 +268,7 @@ class Judgement:
     def _verdict(self, chosen: Sequence[int], added: Sequence[int]) -> Verdict:
         together = [*chosen, *added]
         if not self.allowed(self.plain.solve(together), together, added):
-            return Verdict.IMPOSSIBLE_SIGN
+            return Verdict.IMPLAUSIBLE_SIZE
         if len(added) == 1 and self.identified_by_prior_only(added[0], chosen):
             little = self._weighs_little(added[0], chosen)
             return Verdict.TOO_SMALL if little else Verdict.ACCEPTED

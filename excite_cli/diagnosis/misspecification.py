@@ -28,7 +28,7 @@ from scipy.stats import chi2
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.records import Approximation, ExcessResidual
 from excite_cli.diagnosis.schur import SHARED
-from excite_cli.diagnosis.search_loop import SearchResult
+from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.diagnosis.training import Columns, PartColumns
 from excite_cli.effects.base import Effect, Tier
 

@@ -25,7 +25,7 @@ from excite_cli.diagnosis.records import (
     by_joint,
 )
 from excite_cli.diagnosis.schur import SHARED
-from excite_cli.diagnosis.search_loop import SearchResult
+from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.diagnosis.words import joints_in_words
 from excite_cli.effects.place import Place
@@ -104,7 +104,7 @@ def _suspects(traced: SearchResult, chosen: list[int], accepted: int | None) -> 
             if verdict is Verdict.ACCEPTED:
                 verdict = Verdict.LATER if i in traced.chosen else Verdict.EXPLAINED
         why = ""
-        if verdict is Verdict.IMPOSSIBLE_SIGN:
+        if verdict is Verdict.IMPLAUSIBLE_SIZE:
             together = [*chosen, i]
             why = traced.sizes.why_not(judge.plain.solve(together), together, [i])
         found.append(

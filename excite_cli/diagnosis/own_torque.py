@@ -14,7 +14,8 @@ import numpy as np
 
 from excite_cli.diagnosis.candidates import with_columns
 from excite_cli.diagnosis.modelled_run import ModelledRun, signals_of_all, training_data
-from excite_cli.diagnosis.search_loop import SearchResult, values_of
+from excite_cli.diagnosis.search_loop import values_of
+from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.robot.model import Array
 
 _ROUNDS = 8

@@ -77,8 +77,7 @@ class NamedEffect(Shown):
     If it is only an approximation, `approximates` says of what. `verdict` and `removes` (by joint)
     tell the error on held-out data without it from that with it, all others in; `parts` (by joint)
     of all effects add up to `before.relative_moving` − `after.relative_moving` (`error_parts`),
-    with kept inertias to `untouched` − `after` together with `inertia_parts`. Files of earlier
-    versions have none.
+    with kept inertias to `untouched` − `after` together with `inertia_parts`.
     """
 
     effect: EffectRecord
@@ -260,15 +259,14 @@ class Diagnosis(Shown):
     `effects`: all that were added to the declared model. `noise_floor` [N·m] (N): RMS per joint of
     what changes from period to period in training runs, filtered as for the errors; None if no
     motion was repeated. `parts`: errors on what is held out beside the held-out run. `traces` of
-    the training data, `held_out_traces` of the held-out ones; files of earlier versions have none.
+    the training data, `held_out_traces` of the held-out ones.
     `untouched`: errors on the held-out data of the URDF as given, with the friction of its
-    <dynamics>; None where it has no mass, or in earlier files. `textbook`: the model that any
-    other must be better than; not in earlier files. `inertia_parts` (by joint): what the
-    fit of kept inertias takes off, from that on; empty where they are free. `path`: the error
-    against the number of effects; None where there are none. `inertia_names`: of `phi`, as
+    <dynamics>; None where it has no mass. `textbook`: the model that any
+    other must be better than. `inertia_parts` (by joint): what the
+    fit of kept inertias takes off, from that on; empty where they are free. `inertia_names`: of `phi`, as
     `m[elbow]`; `declared` effects have the values that belong to it. `trained`: errors
     of the model with effects on the data that it was fitted to.
-    `skeleton`: where the joints are, to draw the robot, `recorded`: when; not in earlier files.
+    `skeleton`: where the joints are, to draw the robot, `recorded`: when.
     """
 
     config: str

@@ -10,7 +10,6 @@ left out, with which it is lost): then the answer is the pass with the least err
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -31,6 +30,7 @@ from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
 from excite_cli.diagnosis.placebo import placebos_of
 from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
 from excite_cli.diagnosis.search import CandidateSearch
+from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.diagnosis.textbook import everyday, textbook_effects
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.diagnosis.verdict import Verdict
@@ -51,67 +51,6 @@ _SAME_SHAPE = 0.02  # half of the relative changes of its numbers: energies say 
 _SAME_LEVEL = 0.05  # of a cut, relative: a first pass may have it a quarter too low
 _OBVIOUS, _PLAIN_TO_SEE = 8, 0.2
 Progress = Callable[[str, int], None]
-
-
-@dataclass(frozen=True)
-class SearchResult:
-    """The outcome: training data, candidates, noise, the judgement, the chosen candidates.
-
-    `plain`: candidates of the textbook's model, near which others are where data do not reach.
-    """
-
-    data: TrainingData
-    candidates: tuple[Candidate, ...]
-    noise: NoiseModel
-    judge: Judgement
-    chosen: tuple[int, ...]
-    phi: Array
-    signals: tuple[Signals, ...]
-    levels: Array
-    inflation: float
-    sizes: PossibleSizes
-    model: DeclaredModel
-    usual: UsualMotion
-    plain: tuple[int, ...] = ()
-
-    @property
-    def effects(self) -> tuple[Effect, ...]:
-        """The effects that were found."""
-        return tuple(self.candidates[i].effect for i in self.chosen)
-
-    @cached_property
-    def _least_squares(self) -> tuple[WeightedFit, dict[int, int]]:
-        """Of what was chosen and of the textbook's effects, and where each of them is in it."""
-        members = sorted({*self.chosen, *everyday(self.candidates)})
-        own = [self.candidates[i] for i in members]
-        at = {i: k for k, i in enumerate(members)}
-        if not self.plain:
-            return WeightedFit(self.data, own), at
-        usual = self.usual.gram(self.model, [each.effect for each in own])
-        return WeightedFit(self.data, own, usual, [at[i] for i in self.plain]), at
-
-    def fitted(
-        self, chosen: Sequence[int], held: Array | None = None, roughly: bool = False
-    ) -> Array:
-        """Parameters (k,) of the model with these of what was chosen, or the textbook's effects.
-
-        Weighted least squares, as in `identify`; the first parameters are those that are `held`.
-        `roughly`: with the weights of the model with all that was chosen, a tenth of the time.
-        """
-        fit, at = self._least_squares
-        near = self._weights if roughly else None
-        return fit([at[i] for i in chosen], held, near)[0]
-
-    def imagined(self) -> tuple[Array, Array]:
-        """Rows A (m, k) and b (m,) of unit variance, A x = b, beside the data of what was found."""
-        fit, at = self._least_squares
-        return fit.imagined([at[i] for i in self.chosen])
-
-    @cached_property
-    def _weights(self) -> Array:
-        """What the model with all that was chosen leaves of every joint (n,) [N·m]."""
-        fit, at = self._least_squares
-        return fit([at[i] for i in self.chosen])[1]
 
 
 def trace(

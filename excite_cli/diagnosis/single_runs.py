@@ -14,7 +14,8 @@ from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.held_out_errors import HeldOutRuns
 from excite_cli.diagnosis.modelled_run import DeclaredModel, places_of
 from excite_cli.diagnosis.records import Assumption, HeldOutEnds
-from excite_cli.diagnosis.search_loop import SearchResult, differences
+from excite_cli.diagnosis.search_loop import differences
+from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.base import Effect
 from excite_cli.identification.identified_model import IdentifiedModel

@@ -19,7 +19,7 @@ from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.comparison import ModelComparison
 from excite_cli.diagnosis.extrapolation import torque_seen
 from excite_cli.diagnosis.search import weakest_apart
-from excite_cli.diagnosis.search_loop import SearchResult
+from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.diagnosis.textbook import everyday
 from excite_cli.robot.model import Array
 

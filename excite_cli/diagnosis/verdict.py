@@ -8,7 +8,7 @@ class Verdict(StrEnum):
 
     ACCEPTED = "accepted"
     NOT_SIGNIFICANT = "not significant"
-    IMPOSSIBLE_SIGN = "implausible size"
+    IMPLAUSIBLE_SIZE = "implausible size"
     TOO_SMALL = "too small to matter"
     NO_GAIN = "no gain on data left out"
     LATER = "deferred"

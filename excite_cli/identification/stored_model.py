@@ -23,7 +23,7 @@ class StoredFit(Shown):
     """A fit with its errors and what was noticed.
 
     `closed_loop_bias` is a sentence, `torque_units` per joint, `traces` torque over time,
-    `recorded` when; files of earlier versions have none of them.
+    `recorded` when.
     """
 
     config: str

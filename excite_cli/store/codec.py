@@ -139,7 +139,9 @@ def _bind(name: str, sizes: tuple[int, ...], form: Shape | None, lengths: Length
     """Remember lengths by their symbols, or see that they are as before."""
     for symbol, size in zip(form.lengths if form else (), sizes, strict=False):
         if lengths.setdefault(symbol, size) != size:
-            raise ValueError(f"{name} has {size} in place of {lengths[symbol]} ({symbol})")
+            raise ValueError(
+                f"{name} has the length {size} in place of {lengths[symbol]} ({symbol})"
+            )
 
 
 def _scalar(attributes: Any, name: str, kind: type) -> Any:

@@ -39,7 +39,7 @@ class _StoredEffect:
     joints: tuple[int, ...]
     shape: dict[str, float]
     runs: tuple[str, ...]
-    covariate: str = ""  # files of earlier versions have none
+    covariate: str = ""
 
 
 def write_fit(

@@ -17,7 +17,7 @@ from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
-from excite_cli.diagnosis.search_loop import SearchResult
+from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.asymmetric_friction import AsymmetricFriction
 from excite_cli.effects.base import Effect

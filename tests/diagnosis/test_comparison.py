@@ -8,7 +8,7 @@ import pytest
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.comparison import ModelComparison
-from excite_cli.diagnosis.search_loop import SearchResult
+from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.diagnosis.sufficient import sufficient
 from excite_cli.diagnosis.textbook import everyday, textbook
 from excite_cli.diagnosis.training import TrainingData

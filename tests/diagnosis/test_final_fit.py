@@ -8,7 +8,7 @@ import pytest
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.final_fit import FinalFit, final_fit, friction_lines, signal_to_error
-from excite_cli.diagnosis.search_loop import SearchResult
+from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue

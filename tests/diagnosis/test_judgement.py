@@ -187,7 +187,7 @@ def test_what_spoils_the_inertias_of_another_joint_is_not_small() -> None:
     ("kind", "size", "noise", "declared", "expected"),
     [
         ("viscous_friction", 1.0, 1.0, 1.0, Verdict.ACCEPTED),
-        ("viscous_friction", -1.0, 1.0, 1.0, Verdict.IMPOSSIBLE_SIGN),
+        ("viscous_friction", -1.0, 1.0, 1.0, Verdict.IMPLAUSIBLE_SIZE),
         ("torque_offset", -1.0, 1.0, 1.0, Verdict.ACCEPTED),
         # 1 / √(1² + declared²) is 0.1 % of the torque, then 0.25 %.
         ("viscous_friction", 1.0, 0.1, 1000.0, Verdict.TOO_SMALL),
@@ -316,7 +316,7 @@ def weighed(gain: float, std: float, on: Sequence[Effect]) -> Judgement:
     [
         (0.04, 5.0, Verdict.ACCEPTED),
         (-0.04, 5.0, Verdict.ACCEPTED),
-        (0.7, 50.0, Verdict.IMPOSSIBLE_SIGN),
+        (0.7, 50.0, Verdict.IMPLAUSIBLE_SIZE),
         (0.0015, 0.5, Verdict.TOO_SMALL),  # of 0.2 % that a name needs
     ],
 )

@@ -9,7 +9,7 @@ import pytest
 from excite_cli.diagnosis import own_torque
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.own_torque import at_its_own_torque
-from excite_cli.diagnosis.search_loop import SearchResult
+from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.robot.model import Array
 from tests.diagnosis.explicit_data import effect, planted, traced
 

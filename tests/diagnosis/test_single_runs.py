@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.search_loop import SearchResult
+from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.diagnosis.single_runs import assumptions, differences_between_runs
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.catalogue import catalogue, kind_named

@@ -12,7 +12,7 @@ from excite_cli.diagnosis import sufficient as sufficient_
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.possible_sizes import PossibleSizes
-from excite_cli.diagnosis.search_loop import SearchResult
+from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.diagnosis.sufficient import those_that_matter, with_everyday
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.seen import Seen

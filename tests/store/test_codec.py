@@ -77,7 +77,7 @@ def infinite(file: h5py.File) -> None:
     [
         (without("inner/x"), "it has no 'x'"),
         (without("records/words"), "it has no 'words'"),
-        (resized, r"parts/0/x has 1 in place of 2 \(n\)"),
+        (resized, r"parts/0/x has the length 1 in place of 2 \(n\)"),
         (infinite, "not finite"),
     ],
 )

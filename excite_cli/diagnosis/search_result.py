@@ -1,0 +1,80 @@
+"""What a search found, with all that it was judged by; models of any part of it are refitted."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from excite_cli.diagnosis.candidates import Candidate
+from excite_cli.diagnosis.extrapolation import UsualMotion
+from excite_cli.diagnosis.judgement import Judgement
+from excite_cli.diagnosis.modelled_run import (
+    DeclaredModel,
+)
+from excite_cli.diagnosis.noise_model import NoiseModel
+from excite_cli.diagnosis.possible_sizes import PossibleSizes
+from excite_cli.diagnosis.textbook import everyday
+from excite_cli.diagnosis.training import TrainingData
+from excite_cli.diagnosis.weighted_fit import WeightedFit
+from excite_cli.effects.base import Effect, Signals
+from excite_cli.robot.model import Array
+
+
+@dataclass(frozen=True)
+class SearchResult:
+    """The outcome: training data, candidates, noise, the judgement, the chosen candidates.
+
+    `plain`: candidates of the textbook's model, near which others are where data do not reach.
+    """
+
+    data: TrainingData
+    candidates: tuple[Candidate, ...]
+    noise: NoiseModel
+    judge: Judgement
+    chosen: tuple[int, ...]
+    phi: Array
+    signals: tuple[Signals, ...]
+    levels: Array
+    inflation: float
+    sizes: PossibleSizes
+    model: DeclaredModel
+    usual: UsualMotion
+    plain: tuple[int, ...] = ()
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The effects that were found."""
+        return tuple(self.candidates[i].effect for i in self.chosen)
+
+    @cached_property
+    def _least_squares(self) -> tuple[WeightedFit, dict[int, int]]:
+        """Of what was chosen and of the textbook's effects, and where each of them is in it."""
+        members = sorted({*self.chosen, *everyday(self.candidates)})
+        own = [self.candidates[i] for i in members]
+        at = {i: k for k, i in enumerate(members)}
+        if not self.plain:
+            return WeightedFit(self.data, own), at
+        usual = self.usual.gram(self.model, [each.effect for each in own])
+        return WeightedFit(self.data, own, usual, [at[i] for i in self.plain]), at
+
+    def fitted(
+        self, chosen: Sequence[int], held: Array | None = None, roughly: bool = False
+    ) -> Array:
+        """Parameters (k,) of the model with these of what was chosen, or the textbook's effects.
+
+        Weighted least squares, as in `identify`; the first parameters are those that are `held`.
+        `roughly`: with the weights of the model with all that was chosen, a tenth of the time.
+        """
+        fit, at = self._least_squares
+        near = self._weights if roughly else None
+        return fit([at[i] for i in chosen], held, near)[0]
+
+    def imagined(self) -> tuple[Array, Array]:
+        """Rows A (m, k) and b (m,) of unit variance, A x = b, beside the data of what was found."""
+        fit, at = self._least_squares
+        return fit.imagined([at[i] for i in self.chosen])
+
+    @cached_property
+    def _weights(self) -> Array:
+        """What the model with all that was chosen leaves of every joint (n,) [N·m]."""
+        fit, at = self._least_squares
+        return fit([at[i] for i in self.chosen])[1]
