@@ -259,13 +259,12 @@ class Diagnosis(Shown):
     `effects`: all that were added to the declared model. `noise_floor` [N·m] (N): RMS per joint of
     what changes from period to period in training runs, filtered as for the errors; None if no
     motion was repeated. `parts`: errors on what is held out beside the held-out run. `traces` of
-    the training data, `held_out_traces` of the held-out ones.
-    `untouched`: errors on the held-out data of the URDF as given, with the friction of its
-    <dynamics>; None where it has no mass. `textbook`: the model that any
-    other must be better than. `inertia_parts` (by joint): what the
-    fit of kept inertias takes off, from that on; empty where they are free. `inertia_names`: of `phi`, as
-    `m[elbow]`; `declared` effects have the values that belong to it. `trained`: errors
-    of the model with effects on the data that it was fitted to.
+    the training data, `held_out_traces` of the held-out ones. `untouched`: errors on the held-out
+    data of the URDF as given, with the friction of its <dynamics>; None where it has no mass.
+    `textbook`: the model that any other must be better than. `inertia_parts` (by joint): what the
+    fit of kept inertias takes off, from that on; empty where they are free. `inertia_names`: of
+    `phi`, as `m[elbow]`; `declared` effects have the values that belong to it. `trained`: errors of
+    the model with effects on the data that it was fitted to.
     `skeleton`: where the joints are, to draw the robot, `recorded`: when.
     """
 

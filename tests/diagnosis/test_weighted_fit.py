@@ -138,3 +138,19 @@ def _with(
 ) -> TrainingData:
     prior: dict[str, Any] = {} if declared is None else {"prior": None, "weighed": None}
     return replace(data, tau=tau, declared=declared or data.declared, **prior)
+
+
+def test_what_the_data_do_not_have_no_rounding_of_the_usual_motion_tells() -> None:
+    """A force along the axis of every joint was given 3e14 N so."""
+    seed, lacking = 5, 2
+    candidates = list(random_candidates(seed))
+    own = candidates[lacking]
+    candidates[lacking] = replace(own, columns=tuple(0.0 * each for each in own.columns))
+    columns = usual_motion(seed)
+    ends = FIXED + np.cumsum([0, *(each.width for each in candidates)])
+    columns[:, :, ends[lacking] : ends[lacking + 1]] *= 1e-17
+    usual = np.einsum("tjp,tjq->jpq", columns, columns) / len(columns)
+    rows, _ = WeightedFit(random_data(seed), candidates, usual, (0,)).imagined((0, lacking))
+    start = FIXED + candidates[0].width
+    assert len(rows)
+    assert not rows[:, start : start + own.width].any()
