@@ -27,9 +27,9 @@ from scipy.linalg import block_diag
 
 from excite_cli.checks.samples import FEWEST, Samples
 from excite_cli.checks.setup import Setup
+from excite_cli.dynamics.inertial_prior import inertial_prior
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
-from excite_cli.identification.prior import inertial_prior
 from excite_cli.measurement.dataset import Mask
 from excite_cli.robot.model import Array, Robot
 

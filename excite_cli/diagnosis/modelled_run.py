@@ -8,12 +8,12 @@ import numpy as np
 
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.dynamics.base_parameters import BaseParameters
+from excite_cli.dynamics.inertial_prior import InertialPrior, inertial_prior
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.declared_states import States
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.identification.prior import InertialPrior, inertial_prior
 from excite_cli.identification.regression import (
     effect_columns,
     for_base_columns,

@@ -35,13 +35,14 @@ from excite_cli.diagnosis.textbook import everyday, textbook_effects
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.diagnosis.weighted_fit import WeightedFit
+from excite_cli.dynamics.inertial_prior import InertialPrior
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import scales
 from excite_cli.effects.seen import Seen
 from excite_cli.identification.declared_states import LeftOut, declared_sets
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.identification.prior import InertialPrior, as_wide_as_needed
+from excite_cli.identification.prior import as_wide_as_needed
 from excite_cli.robot.model import Array
 
 _PASSES = 5  # with four, the level of a cut torque was 1.1 % off

@@ -14,6 +14,7 @@ import numpy as np
 
 from excite_cli.config.data_spec import IdentificationSpec
 from excite_cli.dynamics.base_parameters import BaseParameters
+from excite_cli.dynamics.inertial_prior import InertialPrior, inertial_prior
 from excite_cli.dynamics.pseudo_inertia import body_lengths
 from excite_cli.dynamics.regressor import standard_parameter_unit, standard_parameters
 from excite_cli.effects.base import Effect, Parameter, Value
@@ -29,12 +30,7 @@ from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.implausible_links import marked
 from excite_cli.identification.least_squares import LinearFit, fit_rows
 from excite_cli.identification.link_changes import LinkChange, inertial_covariance, link_changes
-from excite_cli.identification.prior import (
-    InertialPrior,
-    as_wide_as_needed,
-    inertial_prior,
-    prior_of,
-)
+from excite_cli.identification.prior import as_wide_as_needed, prior_of
 from excite_cli.identification.regression import Regression, follows_model, rebuilt
 from excite_cli.robot.model import Array, Robot
 from excite_cli.shown.record import Shown

@@ -12,6 +12,7 @@ from excite_cli.config.spec import IdentifiedSpec, Spec
 from excite_cli.diagnosis.candidates import effect_of
 from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.dynamics.base_parameters import find_base_parameters
+from excite_cli.dynamics.inertial_prior import inertial_prior
 from excite_cli.dynamics.pseudo_inertia import body_lengths
 from excite_cli.dynamics.regressor import standard_parameter_names, standard_parameters
 from excite_cli.effects.base import Effect
@@ -22,7 +23,6 @@ from excite_cli.identification.consistent import consistent_near_prior
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit import effect_parameters
 from excite_cli.identification.identified_model import IdentifiedModel
-from excite_cli.identification.prior import inertial_prior
 from excite_cli.identification.processing import Processing
 from excite_cli.identification.stored_model import StoredModel
 from excite_cli.robot.model import Robot, build_measured_robot

@@ -6,6 +6,7 @@ from scipy.optimize import minimize
 
 from excite_cli.config.data_spec import EffectSpec, IdentificationSpec
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
+from excite_cli.dynamics.inertial_prior import InertialPrior, inertial_prior
 from excite_cli.dynamics.pseudo_inertia import (
     BASIS,
     body_lengths,
@@ -21,7 +22,6 @@ from excite_cli.identification.consistent import (
     consistent_parameters,
 )
 from excite_cli.identification.fit import fit
-from excite_cli.identification.prior import InertialPrior, inertial_prior
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.build import true_inertias

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.dynamics.inertial_prior import inertial_prior
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.identification import implausible_links
 from excite_cli.identification.implausible_links import implausible, marked
 from excite_cli.identification.link_changes import LinkChange, link_changes
-from excite_cli.identification.prior import inertial_prior
 from excite_cli.robot.model import Array, build_robot
 from tests.cli.program import SMOKE
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from excite_cli.config.load_spec import load_spec
+from excite_cli.dynamics.inertial_prior import InertialPrior, inertial_prior
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.identification.identify import Identification, identify
 from excite_cli.identification.link_changes import inertial_covariance, link_changes
-from excite_cli.identification.prior import InertialPrior, inertial_prior
 from excite_cli.robot.model import Array
 from excite_cli.summary.identification import (
     identification_answer,
