@@ -27,6 +27,7 @@ from excite_cli.config.section import (
     Section,
     Share,
 )
+from excite_cli.config.task_spec import TaskSpec
 from excite_cli.config.trajectory_spec import FourierSpec, SamplingSpec, TrajectorySpec
 from excite_cli.shown.record import Shown
 
@@ -107,6 +108,7 @@ CriterionKind = Literal[
     "sigma_min",
     "trace_inverse",
     "torque_deviation",
+    "predicted_torque",
     "condition_and_sigma_min",
 ]
 
@@ -211,6 +213,7 @@ class Spec(Shown, Section):
     trajectory: TrajectorySpec = FourierSpec()
     sampling: SamplingSpec = SamplingSpec()
     criterion: CriterionSpec = CriterionSpec()
+    task: TaskSpec = TaskSpec()
     constraints: ConstraintsSpec = ConstraintsSpec()
     uncertainty: UncertaintySpec | None = None
     optimizer: OptimizerSpec = OptimizerSpec()

@@ -21,6 +21,8 @@ class Criterion(ABC):
     name: str
     of_torques: bool = False
     """Whether σ is of columns combined by the torque that they make at random states."""
+    of_work: bool = False
+    """Whether these states are of the user's work, and prior knowledge counts as data."""
     compares_columns: bool = False
     """Whether it is about columns beside each other, so that one alone says nothing."""
 

@@ -7,6 +7,7 @@ from excite_cli.criteria.base import Criterion
 from excite_cli.criteria.condition_and_sigma_min import ConditionAndSigmaMin
 from excite_cli.criteria.condition_number import ConditionNumber
 from excite_cli.criteria.log_det import LogDet
+from excite_cli.criteria.predicted_torque import PredictedTorque
 from excite_cli.criteria.sigma_min import SigmaMin
 from excite_cli.criteria.smooth_condition_number import SmoothConditionNumber
 from excite_cli.criteria.torque_deviation import TorqueDeviation
@@ -20,6 +21,7 @@ CRITERIA: dict[str, Callable[[CriterionSpec], Criterion]] = {
     "sigma_min": lambda spec: SigmaMin(),
     "trace_inverse": lambda spec: TraceInverse(),
     "torque_deviation": lambda spec: TorqueDeviation(),
+    "predicted_torque": lambda spec: PredictedTorque(),
     "condition_and_sigma_min": lambda spec: ConditionAndSigmaMin(),
 }
 

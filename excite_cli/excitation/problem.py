@@ -26,6 +26,7 @@ from excite_cli.excitation.boundary import Boundary, build_boundary
 from excite_cli.excitation.discrimination import Discrimination, Separation
 from excite_cli.excitation.extension import Extension, extend
 from excite_cli.excitation.objective import Objective
+from excite_cli.excitation.prediction import PredictedTorques, Prediction, build_prediction
 from excite_cli.excitation.reference_states import reference_rows, torque_metric
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import Weighting, build_weighting
@@ -132,6 +133,7 @@ class Problem(Shown):
     extension: Extension
     separation: Separation | None = None
     metric: Array | None = None
+    prediction: Prediction | None = None
     folder: Path = Path()
     file: Path | None = None
 
@@ -159,6 +161,8 @@ class Problem(Shown):
         """The cost of one motion on top of `stack`."""
         parts = (self.robot, self.base, self.weighting, self.cost_basis, stack, self.extension)
         if self.separation is None:
+            if self.prediction is not None:
+                return PredictedTorques(*parts, prediction=self.prediction)
             return Objective(*parts, metric=self.metric)
         return Discrimination(*parts, separation=self.separation)
 
@@ -172,11 +176,15 @@ class Problem(Shown):
 
 
 def build_problem(
-    spec: Spec, relative_to: Path | None = None, fit: FitKnowledge | None = None
+    spec: Spec,
+    relative_to: Path | None = None,
+    fit: FitKnowledge | None = None,
+    work: tuple[Array, Array, Array] | None = None,
 ) -> Problem:
     """Resolve `spec`; paths in it start from `relative_to`.
 
-    `fit`: what the file named by `uncertainty.fit` knows.
+    `fit`: what the file named by `uncertainty.fit` knows; `work`: states q, v, a (N, n) of the log
+    or plan that `task` names.
 
     The regressor is extended by the effects that `spec.effects` lists. The friction of the URDF's
     <dynamics> belongs to the declared model of identification, but not to the regressor of a
@@ -206,20 +214,29 @@ def build_problem(
     weighting = build_weighting(spec.criterion, robot, base)
     effects = declared_effects(spec.effects, robot) if spec.effects and not of_load else ()
     extension = extend(robot, base, weighting, effects, trajectory.duration)
+    criterion, prediction = build_criterion(spec.criterion), None
+    if criterion.of_work and not of_load:
+        bounds = acceleration_bounds(spec, robot)
+        prediction = build_prediction(
+            spec, robot, base, effects, bounds, trajectory.duration, len(cost), work
+        )
+        weighting, extension = prediction.weighting, prediction.extension
     columns = base.rank + len(extension.names)
-    if len(cost) * len(robot.rows) < columns:
+    if len(cost) * len(robot.rows) < columns and prediction is None:
         beside = f" and {len(extension.names)} of effects" if extension.names else ""
         raise ConfigError(
             f"sampling.cost: {len(cost)} samples of {len(robot.rows)} rows cannot show "
             f"{base.rank} base parameters{beside}. Take at least "
             f"{-(-columns // len(robot.rows))} samples."
         )
-    criterion = build_criterion(spec.criterion)
     if columns == 1 and criterion.compares_columns:
         raise ConfigError(
             "criterion.kind: this robot has one base parameter, so its condition number is always "
             "1. Take log_det or sigma_min."
         )
+    metric = None
+    if criterion.of_torques and prediction is None:
+        metric = _metric(spec, robot, base, weighting, extension)
     problem = Problem(
         spec=spec,
         robot=robot,
@@ -233,7 +250,8 @@ def build_problem(
         constraint_basis=trajectory.basis(grid),
         kinematics=BatchKinematics(robot),
         extension=extension,
-        metric=_metric(spec, robot, base, weighting, extension) if criterion.of_torques else None,
+        metric=metric,
+        prediction=prediction,
         folder=(relative_to or Path()).resolve(),
     )
     return on_fine_grid(problem) if extension.fine else problem
