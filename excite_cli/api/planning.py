@@ -14,6 +14,7 @@ from excite_cli.diagnosis.next_motion import NextMotion
 from excite_cli.diagnosis.next_motion import plan_after as after_diagnosis
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.diagnosis.words import no_gain_in_words
+from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.excitation.ending import most_motions as most_motions
 from excite_cli.excitation.motion import Doubt
@@ -231,3 +232,25 @@ def plan_after(
     for message in following.messages:
         tell(Note(Level.INFO, message))
     return following
+
+
+def sizes_asked(given: Sequence[str]) -> dict[str, float]:
+    """Sizes by kind of `KIND=SIZE` texts, for the power of planned motions.
+
+    Raises
+    ------
+    ConfigError
+        A text is not KIND=SIZE, or there is no such kind.
+    """
+    found = {}
+    for text in given:
+        kind, _, size = text.partition("=")
+        kind_named(kind.strip(), "--power")
+        try:
+            found[kind.strip()] = abs(float(size))
+        except ValueError:
+            raise ConfigError(
+                f"--power {text}: give the kind of an effect and a size of its first parameter, "
+                "such as --power load_dependent_friction=0.03."
+            ) from None
+    return found

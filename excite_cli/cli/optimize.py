@@ -10,6 +10,9 @@ from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
 from excite_cli.errors import ConfigError
 
+# κ of a UR10's motion is 8 after so many; a diagnosis of it is the same as after 1000.
+QUICK_ITERATIONS = 50
+
 
 class Purpose(StrEnum):
     """What --for plans for."""
@@ -59,6 +62,17 @@ def optimize(
             "--starts", min=1, help="Starts per motion, the best kept; optimizer.restarts."
         ),
     ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A first look: one start, 50 iterations.")
+    ] = False,
+    power: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--power",
+            metavar="KIND=SIZE",
+            help="Probability of naming an effect of this size (may be repeated).",
+        ),
+    ] = None,
     efficiency: Annotated[
         bool,
         typer.Option("--efficiency", help="Information efficiency relative to free states, too."),
@@ -94,7 +108,8 @@ def optimize(
     Examples:
       excite optimize ur10.yaml -o ur10.h5
       excite optimize ur10.yaml -o ur10.h5 --motions 3 --resume
-      excite optimize ur10.yaml -o quick.h5 --set optimizer.max_iterations=20
+      excite optimize ur10.yaml -o look.h5 --quick
+      excite optimize ur10.yaml -o shown.h5 --power load_dependent_friction=0.03
       excite optimize ur10.yaml -o best.h5 --starts 4 --workers 2
       excite optimize ur10.yaml -o judged.h5 --efficiency
       excite optimize ur10.yaml -o more.h5 --prior ur10.h5
@@ -104,7 +119,7 @@ def optimize(
     from excite_cli.api.load_planning import plan_load, problem_beside, save_problem
     from excite_cli.api.loading import load_case, load_problem
     from excite_cli.api.outputs import held_result, result_path
-    from excite_cli.api.planning import Planned, plan, plan_after, plan_answer
+    from excite_cli.api.planning import Planned, plan, plan_after, plan_answer, sizes_asked
     from excite_cli.api.working import single_threaded, working
     from excite_cli.cli.start_line import iterations_of, start_line
 
@@ -118,7 +133,16 @@ def optimize(
         _refuse_beside_payload(fit, after or prior or start or resume, motions)
     inputs = [each for each in (config, *(prior or ()), start, after, fit) if each is not None]
     path = result_path(output, config)
-    changes = options.changes(overrides, seed=seed, motions=motions, restarts=restarts)
+    if quick and restarts is not None:
+        raise ConfigError("--quick makes one start: leave --starts out.")
+    sizes = sizes_asked(power or ())
+    changes = options.changes(
+        overrides,
+        seed=seed,
+        motions=motions,
+        restarts=1 if quick else restarts,
+        iterations=QUICK_ITERATIONS if quick else None,
+    )
     with (
         held_result(path, overwrite, resume, inputs),
         single_threaded(threads),
@@ -147,7 +171,7 @@ def optimize(
                 workers=place,
                 tell=terminal.tell,
             )
-    terminal.show(plan_answer(planned, result, str(path), efficiency))
+    terminal.show(plan_answer(planned, result, str(path), efficiency, sizes))
 
 
 def _refuse_beside_payload(fit: Path | None, other: object, motions: int | None) -> None:

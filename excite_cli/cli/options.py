@@ -119,9 +119,15 @@ def changes(
     seed: int | None = None,
     motions: int | None = None,
     restarts: int | None = None,
+    iterations: int | None = None,
 ) -> list[str]:
     """What changes the config: --set, then the options that have names of their own."""
-    named = {"sequence.motions": motions, "seed": seed, "optimizer.restarts": restarts}
+    named = {
+        "sequence.motions": motions,
+        "seed": seed,
+        "optimizer.restarts": restarts,
+        "optimizer.max_iterations": iterations,
+    }
     given = [f"{key}={value}" for key, value in named.items() if value is not None]
     return [*(overrides or []), *given]
 

@@ -62,15 +62,27 @@ class EffectColumns:
             self.slices.append(slice(first, first + len(effect.parameters)))
             first += len(effect.parameters)
 
-    def signals(self, times: Array, q: Array, v: Array, a: Array) -> Signals:
-        """What the effects look at, for states (T, n) at equidistant `times`."""
-        load = self._dynamics.torques(q, v, a)
+    @property
+    def phi(self) -> Array:
+        """Standard parameters (10·n_bodies,) of the torque that columns depend on."""
+        return self._phi
+
+    def signals(
+        self, times: Array, q: Array, v: Array, a: Array, load: Array | None = None
+    ) -> Signals:
+        """What the effects look at, for states (T, n) at equidistant `times`.
+
+        load: their rigid-body torque (T, n) where it is known.
+        """
+        load = self._dynamics.torques(q, v, a) if load is None else load
         body = RigidBody(self.robot, self._phi, q, v, a, self._model)
         return Signals(times - times[0], q, v, a, load, load, body)
 
-    def evaluate(self, times: Array, q: Array, v: Array, a: Array) -> SeenColumns:
-        """Columns in the measured rows, torque per unit of each parameter."""
-        signals = self.signals(times, q, v, a)
+    def evaluate(
+        self, times: Array, q: Array, v: Array, a: Array, load: Array | None = None
+    ) -> SeenColumns:
+        """Columns in the measured rows, torque per unit of each parameter; see `signals`."""
+        signals = self.signals(times, q, v, a, load)
         columns = np.zeros((len(times), len(self.robot.rows), self.count))
         with sign_of_width(self.width):
             for effect, (own, rows), part in zip(
@@ -81,6 +93,19 @@ class EffectColumns:
 
     def pull_back(self, seen: SeenColumns, weights: Array) -> tuple[Array, Array, Array]:
         """Derivatives by q, v, a, each (T, n), of Σ weights ∘ columns; weights (T, R, k)."""
+        total, by_torque, by_regressor = self.cotangents(seen, weights)
+        if by_torque.any():
+            total += seen.signals.body.pull_back(by_torque)
+        if by_regressor is not None:
+            total += self._regressor_back(seen.signals, by_regressor)
+        return total[0], total[1], total[2]
+
+    def cotangents(self, seen: SeenColumns, weights: Array) -> tuple[Array, Array, Array | None]:
+        """The same (3, T, n) without what reaches q, v, a through the torque or the regressor.
+
+        And the derivatives by these: (T, n), and (T, n, 10·n_bodies) where a column has entries
+        of the regressor.
+        """
         signals, n = seen.signals, self.robot.n
         total = np.zeros((3, *signals.q.shape))
         by_torque, by_regressor = np.zeros_like(signals.load), None
@@ -98,11 +123,7 @@ class EffectColumns:
                     if cotangent is not None:
                         by_torque += cotangent
                 by_regressor = _sum(by_regressor, found)
-        if by_torque.any():
-            total += signals.body.pull_back(by_torque)
-        if by_regressor is not None:
-            total += self._regressor_back(signals, by_regressor)
-        return total[0], total[1], total[2]
+        return total, by_torque, by_regressor
 
     def _regressor_back(self, signals: Signals, weights: Array) -> Array:
         if self._adjoint is None:  # its rows are those of the moved joints, measured or not

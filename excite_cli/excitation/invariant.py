@@ -22,8 +22,9 @@ _SHOWN = 1e-12  # of the energy of effects' columns
 class Invariants:
     """What stacked data tell of torques and of the robot's parameters.
 
-    `torque_deviation`: RMS over random states within the limits, and over the measured rows, of the
-    standard deviation of the predicted torque, in units of the noise of one sample.
+    `torque_deviation`: RMS over random states within the limits (planned for a task: its states),
+    and over the measured rows, of the standard deviation of the predicted torque, in units of the
+    noise of one sample.
     `efficiency`: the information of an instant as a share of that of the best free choice of
     states, if it was asked for; that choice is known up to the factor exp(`slack`).
     """
@@ -40,10 +41,7 @@ def invariants(problem: Problem, stack: Stack, design: FreeDesign | None = None)
     """
     information = _information(problem, stack)
     rows = len(problem.robot.rows)
-    bounds = acceleration_bounds(problem.spec, problem.robot)
-    y = reference_rows(problem.robot, problem.base, bounds, problem.weighting.rows)
-    variance = np.einsum("ik,ik->i", y, np.linalg.solve(information, y.T).T)
-    deviation = float(np.sqrt(variance.mean()))
+    deviation = _deviation(problem, stack, information)
     if design is None:
         return Invariants(deviation)
     return Invariants(
@@ -51,6 +49,16 @@ def invariants(problem: Problem, stack: Stack, design: FreeDesign | None = None)
         design.efficiency(information, stack.rows / rows),
         design.slack,
     )
+
+
+def _deviation(problem: Problem, stack: Stack, information: Array) -> float:
+    """That of the work, where motions are planned for it; else of the base parameters alone."""
+    if problem.prediction is not None:
+        return problem.prediction.deviation(stack.factor)
+    bounds = acceleration_bounds(problem.spec, problem.robot)
+    y = reference_rows(problem.robot, problem.base, bounds, problem.weighting.rows)
+    variance = np.einsum("ik,ik->i", y, np.linalg.solve(information, y.T).T)
+    return float(np.sqrt(variance.mean()))
 
 
 def design_for(problem: Problem) -> FreeDesign:
@@ -67,7 +75,7 @@ def _information(problem: Problem, stack: Stack) -> Array:
     factor = stack.factor / problem.column_scales
     whole, rank = factor.T @ factor, problem.base.rank
     own, beside, others = whole[:rank, :rank], whole[:rank, rank:], whole[rank:, rank:]
-    if not others.size:
+    if not others.size or problem.prediction is not None:  # effects may be, they need not
         return np.asarray(own)
     sizes = np.sqrt(np.diag(others))
     sizes[sizes == 0.0] = 1.0

@@ -86,6 +86,8 @@ class Objective:
         self._few = FictitiousInertiaAdjoint(robot, base.silent_direction())
         self._many = SpatialAdjoint(robot)
         self._plain = weighting.plain
+        # Every moved joint is measured: then torques and their derivatives are those of the rows.
+        self._whole = np.array_equal(robot.rows, robot.moved)
 
     def block(self, coefficients: Array) -> Array:
         """Weighted and scaled columns of this motion alone, (T·R, r)."""
@@ -93,21 +95,26 @@ class Objective:
 
     def block_of(self, times: Array, q: Array, v: Array, a: Array) -> Array:
         """Weighted and scaled columns (T·R, r) of states (T, n) at equidistant `times`."""
-        return self._block(q, v, a, self._seen(times, q, v, a))
+        return self._evaluated(times, q, v, a)[0]
 
-    def _seen(self, times: Array, q: Array, v: Array, a: Array) -> SeenColumns | None:
-        return None if self._effects is None else self._effects.evaluate(times, q, v, a)
-
-    def _block(self, q: Array, v: Array, a: Array, seen: SeenColumns | None) -> Array:
+    def _evaluated(
+        self, times: Array, q: Array, v: Array, a: Array
+    ) -> tuple[Array, SeenColumns | None]:
+        """Weighted and scaled columns (T·R, r), and those of effects as they are."""
         if KERNELS is not None:
             y = self._many.regressor(q, v, a, self.base.selection)
         else:
             y = self._regressor.evaluate(q, v, a)[:, :, self.base.selection]
+        seen = None
+        if self._effects is not None:
+            values = self.base.mapping @ self._effects.phi
+            load = y @ values if self._whole else None
+            seen = self._effects.evaluate(times, q, v, a, load)
         if not self._plain:
             y = y * self.weighting.rows[:, None] * self.weighting.columns
         if seen is not None:
             y = np.concatenate([y, seen.columns * self._effect_weights()], axis=2)
-        return y.reshape(-1, self.size)
+        return y.reshape(-1, self.size), seen
 
     def _effect_weights(self) -> Array:
         """Row weight times column scale, (R, k), of the columns of effects."""
@@ -155,41 +162,63 @@ class Objective:
     ) -> tuple[float, Array, Spectrum]:
         """Criterion, its derivative (K, n) with respect to the coefficients, and the spectrum."""
         q, v, a = self.basis.states(coefficients)
-        seen = self._seen(self.basis.times, q, v, a)
-        block = self._block(q, v, a, seen)
+        block, seen = self._evaluated(self.basis.times, q, v, a)
         spectrum = self.spectrum(block)
-        gradient = self.basis.pull_back(*self._by_states(q, v, a, block, spectrum, criterion))
-        if seen is not None:
-            gradient += self._through_effects(seen, block, spectrum, criterion)
-        return criterion.value(spectrum.sigma), gradient, spectrum
+        parts = self._by_states(q, v, a, block, spectrum, criterion, seen)
+        return criterion.value(spectrum.sigma), self.basis.pull_back(*parts), spectrum
 
     def _by_states(
-        self, q: Array, v: Array, a: Array, block: Array, spectrum: Spectrum, criterion: Criterion
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+        block: Array,
+        spectrum: Spectrum,
+        criterion: Criterion,
+        seen: SeenColumns | None,
     ) -> tuple[Array, Array, Array]:
-        """Derivatives (T, n) by q, v, a through the regressor."""
+        """Derivatives (T, n) by q, v, a through the regressor, and through columns of effects."""
         weight = criterion.derivative(spectrum.sigma)
         kept = np.flatnonzero(np.abs(weight) > _NEGLIGIBLE * np.abs(weight).max())
-        if KERNELS is None and len(kept) <= FEW_PAIRS:
+        if KERNELS is None and len(kept) <= FEW_PAIRS and seen is None:
             return self._few.pull_back(q, v, a, *self.pairs(block, spectrum, criterion))
         # ∂f/∂C = C V diag(w/σ) Vᵀ, the product that is cheaper first.
         vectors, rank = spectrum.right[:, kept], self.base.rank
         scaled = vectors * (weight[kept] / spectrum.sigma[kept])
-        inertial = vectors[:rank].T
-        few = len(kept) < rank // 2
-        by_block = (block @ scaled) @ inertial if few else block @ (scaled @ inertial)
-        by_block = by_block.reshape(len(q), -1, rank)
+        few = len(kept) < len(vectors) // 2
+        by_block = (block @ scaled) @ vectors.T if few else block @ (scaled @ vectors.T)
+        by_block = by_block.reshape(len(q), -1, self.size)
+        inertial = by_block[:, :, :rank]
         if not self._plain:
-            by_block = by_block * self.weighting.rows[:, None] * self.weighting.columns
-        weights = np.zeros((*by_block.shape[:2], len(self.base.names)))
-        weights[:, :, self.base.selection] = by_block
-        return self._many.pull_back_dense(q, v, a, weights)
+            inertial = inertial * self.weighting.rows[:, None] * self.weighting.columns
+        weights = np.zeros((*inertial.shape[:2], len(self.base.names)))
+        weights[:, :, self.base.selection] = inertial
+        if seen is None:
+            return self._many.pull_back_dense(q, v, a, weights)
+        return self._with_effects(weights, by_block[:, :, rank:] * self._effect_weights(), seen)
+
+    def _with_effects(
+        self, weights: Array, by_columns: Array, seen: SeenColumns
+    ) -> tuple[Array, Array, Array]:
+        """One pass for both: what depends on the torque Y φ depends on the regressor."""
+        assert self._effects is not None
+        q, v, a = seen.signals.q, seen.signals.v, seen.signals.a
+        if not self._whole:
+            beside = self._effects.pull_back(seen, by_columns)
+            own = self._many.pull_back_dense(q, v, a, weights)
+            return own[0] + beside[0], own[1] + beside[1], own[2] + beside[2]
+        direct, by_torque, by_regressor = self._effects.cotangents(seen, by_columns)
+        weights += by_torque[:, :, None] * self._effects.phi
+        if by_regressor is not None:
+            weights += by_regressor
+        own = self._many.pull_back_dense(q, v, a, weights)
+        return own[0] + direct[0], own[1] + direct[1], own[2] + direct[2]
 
     def effect_gradient(self, coefficients: Array, criterion: Criterion) -> Array:
         """The part (K, n) of the gradient that goes through columns of effects."""
-        seen = self._seen(self.basis.times, *self.basis.states(coefficients))
+        block, seen = self._evaluated(self.basis.times, *self.basis.states(coefficients))
         if seen is None:
             return np.zeros_like(coefficients)
-        block = self._block(seen.signals.q, seen.signals.v, seen.signals.a, seen)
         return self._through_effects(seen, block, self.spectrum(block), criterion)
 
     def pairs(self, block: Array, spectrum: Spectrum, criterion: Criterion) -> tuple[Array, Array]:

@@ -27,6 +27,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import block_diag, cho_factor, cho_solve
 
 from excite_cli.config.spec import Spec
@@ -38,7 +39,7 @@ from excite_cli.dynamics.regressor import Regressor, standard_parameters
 from excite_cli.effects.base import Effect, Tier
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION, catalogue, kind_named, shows
 from excite_cli.errors import ConfigError, nearest
-from excite_cli.excitation.extension import Extension, extend
+from excite_cli.excitation.extension import Extension, extend, why_not_planned
 from excite_cli.excitation.objective import Objective, Spectrum
 from excite_cli.excitation.reference_states import state_bounds
 from excite_cli.excitation.weighting import Weighting
@@ -65,7 +66,8 @@ class Prediction:
 
     `weighting`: 1/noise of the rows of a cost instant, and deviations of base parameters;
     `extension`: declared effects, then those that the robot may have, scaled by their deviations;
-    `prior` R (c, c); `work` Φ (N, c), c = r + k; `usual` (R,): usual torque of a row [N·m, N].
+    `prior` R (c, c); `work` Φ (N, c), c = r + k; `usual` (R,): usual torque of a row [N·m, N];
+    `shares` (k,): of it, what an effect with the prior deviation makes.
     """
 
     weighting: Weighting
@@ -73,6 +75,18 @@ class Prediction:
     prior: Array
     work: Array
     usual: Array
+    shares: Array
+
+    @property
+    def rank(self) -> int:
+        """r: base parameters come first."""
+        return len(self.weighting.columns)
+
+    @cached_property
+    def first_columns(self) -> NDArray[np.intp]:
+        """The column of every effect's first parameter."""
+        slices = self.extension.columns().slices
+        return np.array([self.rank + part.start for part in slices], dtype=np.intp)
 
     @cached_property
     def root(self) -> Array:
@@ -136,11 +150,13 @@ def build_prediction(
     duration: float,
     instants: int,
     work: _States | None = None,
+    more: Sequence[str] = (),
 ) -> Prediction:
     """The prediction for motions of `duration` [s] whose cost is taken at so many `instants`.
 
     accelerations: bounds (n,), infinite where there is none; work: q, v, a (N, n) of the log or
-    the plan that `spec.task` names; without it states of the region are drawn.
+    the plan that `spec.task` names; without it states of the region are drawn; more: kinds that
+    the robot may have beside those of `spec.task`.
 
     Raises
     ------
@@ -157,9 +173,11 @@ def build_prediction(
     deviations = np.maximum(deviations, 1e-9 * deviations.max())
     rows = np.sqrt(spec.task.rate * duration / instants) / noise
     weighting = Weighting(rows, deviations, "1/noise", "prior deviation")
-    effects = (*declared, *_possible(spec.task, robot, declared))
+    effects = (*declared, *_possible(spec.task, robot, declared, more))
     extension = extend(robot, base, weighting, effects, duration, absorbed_too=True)
-    extension = replace(extension, scales=_prior_sizes(extension, robot, drawn, usual))
+    shares = _shares(extension)
+    sizes = _size_of_usual(extension, drawn, usual)
+    extension = replace(extension, scales=shares * sizes)
     whiten, _ = inertial_prior(robot, phi, UNSURE).on_base(base)
     prior = block_diag(whiten * deviations, np.eye(len(extension.scales)))
     if work is None:
@@ -168,7 +186,8 @@ def build_prediction(
     y = Regressor(robot).evaluate(*work)[:, :, base.selection] * deviations
     seen = extension.columns().evaluate(np.arange(float(len(work[0]))), *work)
     both = np.concatenate([y, seen.columns * extension.scales], axis=2) / noise[:, None]
-    return Prediction(weighting, extension, prior, both.reshape(-1, both.shape[2]), usual)
+    rows_of_work = both.reshape(-1, both.shape[2])
+    return Prediction(weighting, extension, prior, rows_of_work, usual, shares)
 
 
 def _split(states: Array) -> _States:
@@ -195,18 +214,21 @@ def _noise(spec: Spec, robot: Robot, usual: Array) -> Array:
     return np.asarray(noise)
 
 
-def _possible(task: TaskSpec, robot: Robot, declared: Sequence[Effect]) -> list[Effect]:
+def _possible(
+    task: TaskSpec, robot: Robot, declared: Sequence[Effect], more: Sequence[str]
+) -> list[Effect]:
     """Effects that the robot may have beside the `declared` ones, each in its usual shape."""
-    kinds = (
-        [kind for kind in catalogue().values() if _may_be_planned_for(kind, robot)]
-        if task.effects == "auto"
-        else [kind_named(name, "task.effects") for name in task.effects]
-    )
-    there = {effect.place for effect in declared}
-    found = []
-    for kind in kinds:
+    usual = task.effects
+    if task.effects == "auto":
+        usual = tuple(k for k, kind in catalogue().items() if _may_be_planned_for(kind, robot))
+    there, found = {effect.place for effect in declared}, []
+    for name in dict.fromkeys((*usual, *more)):
+        kind = kind_named(name, "task.effects")
         shape, _ = kind.planted(0.0, {})
-        effects = (kind(place, shape) for place in kind.places(robot))
+        effects = [kind(place, shape) for place in kind.places(robot)]
+        reasons = [why_not_planned(each, robot) for each in effects]
+        if effects and all(reasons):
+            raise ConfigError(f"{name}: no planned motion shows it: {reasons[0]}.")
         found += [each for each in effects if each.place not in there and shows(each, robot)]
     return found
 
@@ -227,21 +249,23 @@ def _may_be_planned_for(kind: type[Effect], robot: Robot) -> bool:
     )
 
 
-def _prior_sizes(extension: Extension, robot: Robot, states: _States, usual: Array) -> Array:
-    """Deviation (k,) of every parameter of the effects: its share of the joint's usual torque."""
-    seen = extension.columns().evaluate(np.arange(float(_STATES)), *states)
-    rms = np.sqrt(np.mean(np.square(seen.columns), axis=0))  # (R, k)
-    row = np.argmax(rms / usual[:, None], axis=0)
+def _shares(extension: Extension) -> Array:
+    """Share (k,) of its joint's usual torque that an effect may well have."""
     everyday = {*EVERYDAY_FRICTION, *EVERYDAY}
-    shares = np.array(
+    return np.array(
         [
             _EVERYDAY_SHARE if effect.kind in everyday else _SHARE
             for effect in extension.effects
             for _ in effect.parameters
         ]
     )
-    at = (row, np.arange(len(row)))
-    return np.asarray(shares * usual[row] / rms[at]) if len(row) else np.zeros(0)
+
+
+def _size_of_usual(extension: Extension, states: _States, usual: Array) -> Array:
+    """Value (k,) of every parameter that makes the usual torque of its row, RMS at these states."""
+    seen = extension.columns().evaluate(np.arange(float(len(states[0]))), *states)
+    rms = np.sqrt(np.mean(np.square(seen.columns), axis=0)) / usual[:, None]  # (R, k)
+    return np.asarray(1.0 / rms.max(axis=0, initial=0.0))
 
 
 def _region(task: TaskSpec, robot: Robot, lower: Array, upper: Array) -> tuple[Array, Array]:

@@ -3,11 +3,12 @@
 from typing import Any
 
 from excite_cli.excitation.inspection import Inspection, Inspections
+from excite_cli.excitation.not_modelled import not_modelled
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.reasons import standing_in_words
 from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
-from excite_cli.summary.pairs import pairs_data, pairs_in_words, worst_data
+from excite_cli.summary.pairs import not_modelled_in_words, pairs_data, pairs_in_words, worst_data
 
 _CAPTION = "Margins are distances to the limit, beyond any safety margin that the config requires."
 
@@ -22,9 +23,10 @@ def check_answer(found: Inspections, file: str, problem: Problem) -> Answer:
         "random": found.look.random,
         "slow": found.slow,
         "pairs": pairs_data(problem),
+        "not_modelled": list(not_modelled(problem)),
     }
     parts = inspections_parts(found)
-    parts[-1:-1] = pairs_in_words(problem)
+    parts[-1:-1] = [*pairs_in_words(problem), not_modelled_in_words(problem)]
     return Answer(tuple(parts), data, good=not found.violations)
 
 

@@ -1,6 +1,6 @@
 """Planned motions: condition numbers beside each other, worst margins, what comes after them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,8 +9,10 @@ from excite_cli.config.spec import UntilSpec
 from excite_cli.diagnosis.next_motion import NextMotion
 from excite_cli.excitation.dense_grid import flattered
 from excite_cli.excitation.ending import Ending
+from excite_cli.excitation.expectation import expectation
 from excite_cli.excitation.invariant import Invariants, design_for, invariants
 from excite_cli.excitation.motion import Motion
+from excite_cli.excitation.not_modelled import not_modelled
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Status
 from excite_cli.excitation.random_baseline import RandomMotion
@@ -18,35 +20,53 @@ from excite_cli.excitation.random_comparison import Comparison
 from excite_cli.excitation.result import Result
 from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
-from excite_cli.summary.pairs import doubts_in_words, pairs_data, pairs_in_words, worst_data
+from excite_cli.summary.expectation import expectation_parts, power_data
+from excite_cli.summary.pairs import (
+    doubts_in_words,
+    not_modelled_in_words,
+    pairs_data,
+    pairs_in_words,
+    worst_data,
+)
 from excite_cli.summary.problem import problem_parts
 from excite_cli.trajectory.fade import Segment
 
 
 def plan_answer(
-    planned: Problem | NextMotion, result: Result, output: str, efficiency: bool = False
+    planned: Problem | NextMotion,
+    result: Result,
+    output: str,
+    efficiency: bool = False,
+    power: Mapping[str, float] | None = None,
 ) -> Answer:
-    """What `excite optimize` answers: the motions, and what they are expected to tell apart.
+    """What `excite optimize` answers: the motions, and what they are expected to tell.
 
     With `efficiency` also their share of the information that freely chosen states could have,
-    which takes seconds.
+    which takes seconds; `power`: sizes of effects, by kind, that they should show.
     """
     following = planned if isinstance(planned, NextMotion) else None
     model = planned.model if isinstance(planned, NextMotion) else planned
     parts: Parts = [*result_parts(result), output]
-    data = {
+    data: dict[str, Any] = {
         "motions": [motion_data(m) for m in result.motions],
         "criterion": criterion_data(model),
         "pairs": pairs_data(model),
+        "not_modelled": list(not_modelled(model)),
         "output": output,
     }
-    parts[-1:-1] = pairs_in_words(model)
+    parts[-1:-1] = [*pairs_in_words(model), not_modelled_in_words(model)]
     good, until = True, model.spec.sequence.until
     if model.spec.criterion.of == "robot" and result.motions:
         judged = efficiency or (until is not None and until.efficiency is not None)
         found = invariants(model, result.stack, design_for(model) if judged else None)
         data.update(invariants_data(found))
-        parts.insert(-1, invariants_in_words(found))
+        if found.efficiency is not None:
+            parts.insert(-1, invariants_in_words(found))
+        expected = expectation(model, result, power)
+        for each, deviation in zip(data["motions"], expected.deviations, strict=True):
+            each["predicted_deviation"] = deviation
+        data["power"] = power_data(expected.power)
+        parts[:0] = expectation_parts(model, expected, bool(power))
         if until is not None:
             good = Ending(model).enough(found)
             seconds = len(result.motions) * model.trajectory.duration
@@ -99,18 +119,13 @@ def result_parts(result: Result) -> Parts:
 
 
 def invariants_in_words(found: Invariants) -> str:
-    """Figures that are the same whichever columns are called base parameters."""
-    words = (
-        f"Standard deviation of the predicted torque: {found.torque_deviation:.2g} times that of "
-        "the torque noise (RMS over random states within the limits; it does not depend on the "
-        "choice of base parameters)"
-    )
-    if found.efficiency is None or found.slack is None:
-        return f"{words}."
+    """The share of information, the same whichever columns are called base parameters."""
+    assert found.efficiency is not None
+    assert found.slack is not None
     low = found.efficiency * np.exp(-found.slack)
     return (
-        f"{words}; information efficiency: {100 * low:.2g} to {100 * found.efficiency:.2g} % of "
-        "D-optimal free states."
+        f"Information efficiency: {100 * low:.2g} to {100 * found.efficiency:.2g} % of D-optimal "
+        "free states."
     )
 
 

@@ -4,8 +4,12 @@ from collections.abc import Sequence
 from typing import Any
 
 from excite_cli.constraints.obstacle_clearance import Surroundings
-from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.excitation.motion import Doubt, Motion
+from excite_cli.excitation.not_modelled import (
+    bodies_without_shapes,
+    links_without_shapes,
+    not_modelled,
+)
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.reasons import DroppedPair, Why, dropped_in_words, reason_in_words
 from excite_cli.proof.certificate import Worst
@@ -57,36 +61,14 @@ def unjudged(problem: Problem) -> list[DroppedPair]:
     ]
 
 
-def _guarded(problem: Problem) -> set[str] | None:
-    """Links that capsules keep apart; None where self-collision is not asked for."""
-    capsules = [c.capsules for c in problem.constraints if isinstance(c, SelfCollision)]
-    return {link for of in capsules for one in of for link in one.links} if capsules else None
-
-
-def links_without_shapes(problem: Problem) -> list[str]:
-    """Links of `without_shapes` that have none indeed."""
-    own, guarded = problem.spec.constraints.self_collision, _guarded(problem)
-    if own is None or guarded is None:
-        return []
-    return [link for link in own.without_shapes if link not in guarded]
-
-
-def not_guarded(problem: Problem) -> list[str]:
-    """Moved joints whose bodies have mass and no shape, where self-collision is asked for."""
-    guarded = _guarded(problem)
-    if guarded is None:
-        return []
-    model, links = problem.robot.model, links_by_joint(problem.robot)
-    return [
-        joint
-        for joint in problem.robot.tree.joint_names
-        if model.inertias[model.getJointId(joint)].mass > 0 and not guarded & set(links[joint])
-    ]
-
-
 def kept_apart(problem: Problem) -> int:
     """Number of pairs of capsules, meshes and surroundings that are kept apart."""
     return sum(len(c.labels) for c in problem.constraints if c.left_out is not None)
+
+
+def not_modelled_in_words(problem: Problem) -> str:
+    """What the verdict does not speak of."""
+    return f"Not modelled: {'; '.join(not_modelled(problem))}."
 
 
 def pairs_in_words(problem: Problem) -> list[str]:
@@ -105,7 +87,7 @@ def counted(problem: Problem) -> list[str]:
         return []
     around = any(isinstance(each, Surroundings) for each in problem.constraints)
     what = "Collision: {} pairs" if around else "Self-collision: {} link pairs"
-    bare = not_guarded(problem) or links_without_shapes(problem)
+    bare = bodies_without_shapes(problem) or links_without_shapes(problem)
     shaped = " with collision shapes" if bare else ""
     many = f"{kept} of {kept + left} relevant" if left or kept == 1 else f"all {kept} relevant"
     return [f"{what.format(many)}{shaped} checked."]
@@ -114,7 +96,9 @@ def counted(problem: Problem) -> list[str]:
 def unguarded_in_words(problem: Problem) -> list[str]:
     """A sentence on the bodies that have no shapes; empty where all have."""
     links, without = links_by_joint(problem.robot), links_without_shapes(problem)
-    bare = [joint for joint in not_guarded(problem) if not set(without) & set(links[joint])]
+    bare = [
+        joint for joint in bodies_without_shapes(problem) if not set(without) & set(links[joint])
+    ]
     told = ", ".join(f"{joint} ({', '.join(links[joint])})" for joint in bare)
     sentences = []
     if bare:
@@ -138,7 +122,7 @@ def pairs_data(problem: Problem) -> dict[str, Any]:
     """The same for `--json`."""
     return {
         "kept_apart": kept_apart(problem),
-        "not_guarded": not_guarded(problem),
+        "not_guarded": bodies_without_shapes(problem),
         "links_without_shapes": links_without_shapes(problem),
         "not_kept_apart": [
             {

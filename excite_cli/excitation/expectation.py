@@ -1,0 +1,88 @@
+"""What planned motions are expected to tell: torques of the work, and effects that would show.
+
+The same figures whatever the motions were planned for, and with whatever weights.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from excite_cli.excitation.power import EffectPower, power_of, sizes_shown
+from excite_cli.excitation.prediction import build_prediction
+from excite_cli.excitation.problem import Problem, acceleration_bounds, on_fine_grid
+from excite_cli.excitation.result import Result
+from excite_cli.excitation.stack import Stack
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """`deviations`: after each motion, with all before it, the RMS standard deviation of a torque
+    of the work in units of the noise of one sample; `power`: of the effects, after all of them.
+
+    `all_data`: whether earlier data (`--prior`) are in these figures.
+    """
+
+    deviations: tuple[float, ...]
+    power: tuple[EffectPower, ...]
+    all_data: bool = True
+
+
+def expectation(
+    problem: Problem, result: Result, asked: Mapping[str, float] | None = None
+) -> Expectation:
+    """Of the motions in `result`; `asked`: sizes, by kind, whose power is asked for.
+
+    Raises
+    ------
+    ConfigError
+        No planned motion shows an effect that is asked for.
+    """
+    asked = asked or {}
+    own = predicting(problem, tuple(asked))
+    prediction = own.prediction
+    assert prediction is not None
+    same = own is problem
+    stack = result.prior_stack if same else Stack.empty(own.columns)
+    objective, deviations = own.objective(), []
+    for motion in result.motions:
+        stack = stack.with_rows(objective.block(motion.coefficients))
+        deviations.append(prediction.deviation(stack.factor))
+    alpha = problem.spec.diagnosis.significance
+    power = tuple(
+        each
+        for kind, size in asked.items()
+        for each in power_of(prediction, stack, alpha, kind, size)
+    )
+    return Expectation(
+        tuple(deviations),
+        power if asked else sizes_shown(prediction, stack, alpha),
+        same or not result.prior_stack.rows,
+    )
+
+
+def predicting(problem: Problem, kinds: Sequence[str] = ()) -> Problem:
+    """The problem with its prediction, in which these kinds of effects are possible, too.
+
+    Made for another criterion, or without one of them, it gets a prediction beside that.
+    """
+    there = {effect.kind for effect in problem.extension.effects}
+    if problem.prediction is not None and there.issuperset(kinds):
+        return problem
+    made = build_prediction(
+        problem.spec,
+        problem.robot,
+        problem.base,
+        [] if problem.prediction is not None else problem.extension.effects,
+        acceleration_bounds(problem.spec, problem.robot),
+        problem.trajectory.duration,
+        len(problem.cost_basis.times),
+        more=kinds,
+    )
+    wide = replace(
+        problem,
+        weighting=made.weighting,
+        extension=made.extension,
+        prediction=made,
+        separation=None,
+        metric=None,
+    )
+    return on_fine_grid(wide) if made.extension.fine else wide

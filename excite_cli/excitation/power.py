@@ -1,0 +1,113 @@
+"""Which effects motions would show: before anything is measured.
+
+After motions with information M (`prediction.py`), all else being unknown as its prior says, the
+data alone know the size z of an effect (in units of its prior deviation) with
+
+    s⁻² = 1 / (M⁻¹)_zz − 1.
+
+A diagnosis names it where it saves more χ² than its price c (`price`). With the true size z that
+χ² is noncentral, so that it is named with the power P(χ²₁(z²/s²) > c), and the size that is named
+with 95 % is about s (√c + 1.645).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import chi2, ncx2
+
+from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import catalogue
+from excite_cli.excitation.prediction import Prediction
+from excite_cli.excitation.stack import Stack
+
+SURE = 0.95
+# χ² of columns that are shifted in time exceeds that of chance by this factor: the median of the
+# placebos of real logs.
+_INFLATION = 1.5
+_LARGEST = 1e3  # times the price's deviation
+
+
+@dataclass(frozen=True)
+class EffectPower:
+    """The `size` of an effect's first parameter, in `unit`, that is named with this `power`.
+
+    `share`: that size as a share of the joint's usual torque, by the effect's RMS torque.
+    """
+
+    kind: str
+    joints: tuple[str, ...]
+    parameter: str
+    size: float
+    unit: str
+    share: float
+    power: float
+
+
+def price(kind: type[Effect], significance: float) -> float:
+    """χ² that an effect with one parameter must save to be named."""
+    tests = len(catalogue())
+    return _INFLATION * float(chi2.isf(significance / tests, 1)) + kind.prior_cost
+
+
+def sizes_shown(
+    prediction: Prediction, stack: Stack, significance: float, power: float = SURE
+) -> tuple[EffectPower, ...]:
+    """For every effect that the robot may have, the size that the motions in `stack` would show."""
+    return tuple(
+        _shown(prediction, at, deviation, significance, power)
+        for at, deviation in enumerate(_deviations(prediction, stack))
+    )
+
+
+def power_of(
+    prediction: Prediction, stack: Stack, significance: float, kind: str, size: float
+) -> tuple[EffectPower, ...]:
+    """How probably the motions would show effects of `kind` with `size`, on every joint."""
+    found = []
+    for at, deviation in enumerate(_deviations(prediction, stack)):
+        effect, scale, share = _about(prediction, at)
+        if effect.kind == kind:
+            noncentral = (size / scale / deviation) ** 2
+            chance = float(ncx2.sf(price(type(effect), significance), 1, noncentral))
+            found.append(_record(prediction, effect, size, share * size / scale, chance))
+    return tuple(found)
+
+
+def _deviations(prediction: Prediction, stack: Stack) -> np.ndarray:
+    """s of the first parameter of every effect, infinite where the motions say nothing of it."""
+    covariance = np.linalg.inv(prediction.information(stack.factor))
+    variance = np.diag(covariance)[prediction.first_columns]
+    informed = np.maximum(1.0 / variance - 1.0, 0.0)
+    with np.errstate(divide="ignore"):
+        return np.asarray(informed**-0.5)
+
+
+def _shown(
+    prediction: Prediction, at: int, deviation: float, significance: float, power: float
+) -> EffectPower:
+    effect, scale, share = _about(prediction, at)
+    cost = price(type(effect), significance)
+    if np.isfinite(deviation):
+        least = np.sqrt(cost)
+        times = brentq(lambda x: ncx2.sf(cost, 1, x * x) - power, 1e-3, least + _LARGEST)
+        size = float(times * deviation)
+    else:
+        size = float("inf")
+    return _record(prediction, effect, size * scale, size * share, power)
+
+
+def _about(prediction: Prediction, at: int) -> tuple[Effect, float, float]:
+    """An effect, the prior deviation of its first parameter, and the share of torque that makes."""
+    effect = prediction.extension.effects[at]
+    column = int(prediction.first_columns[at]) - prediction.rank
+    return effect, float(prediction.extension.scales[column]), float(prediction.shares[column])
+
+
+def _record(
+    prediction: Prediction, effect: Effect, size: float, share: float, power: float
+) -> EffectPower:
+    robot, first = prediction.extension.robot, effect.parameters[0]
+    joints = tuple(robot.joint_names[j] for j in effect.joints)
+    unit = effect.unit_on(first.unit, robot.sliding)
+    return EffectPower(effect.kind, joints, first.name, size, unit, share, power)

@@ -1,0 +1,88 @@
+"""What planned motions are expected to tell, for people and for `--json`."""
+
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+
+from excite_cli.excitation.expectation import Expectation
+from excite_cli.excitation.power import EffectPower
+from excite_cli.excitation.problem import Problem
+from excite_cli.shown.answer import Parts, Table
+
+_MOST = 10.0  # times the usual torque: no robot has more of an effect
+
+
+def expectation_parts(problem: Problem, found: Expectation, asked: bool) -> Parts:
+    """Predicted deviation after every motion, and the sizes of effects that would be named."""
+    after = ", ".join(f"{each:.2g}" for each in found.deviations)
+    numbers = f"motion {len(found.deviations)}" if len(found.deviations) == 1 else "each motion"
+    beside = "" if found.all_data else ", earlier data aside"
+    words = (
+        f"Predicted torques deviate by {after} times the noise of one sample after {numbers} "
+        f"(RMS, {where_in_words(problem)}{beside})."
+    )
+    return [words, _asked_table(found.power) if asked else _power_table(found.power)]
+
+
+def where_in_words(problem: Problem) -> str:
+    """The states whose torques are predicted."""
+    task = problem.spec.task
+    if task.log or task.plan:
+        return f"at the states of {task.log or task.plan}"
+    if task.position or task.speed < 1.0 or task.acceleration < 1.0:
+        return "at states of the region of `task`"
+    return "at states within the limits"
+
+
+def _power_table(power: tuple[EffectPower, ...]) -> Table:
+    rows = []
+    for kind, group in groupby(power, key=lambda each: each.kind):
+        of = list(group)
+        best = min(of, key=lambda each: each.share)
+        worst = max(of, key=lambda each: each.share)
+        rows.append((kind, _share(best), ", ".join(best.joints), _share(worst), _joints(worst)))
+    return Table(
+        "Effects that these motions would show: size named with 95%, as a share of the joint's "
+        "usual torque",
+        ("effect", "from", "on", "to", "on "),
+        tuple(rows),
+        left=("effect", "on", "on "),
+    )
+
+
+def _share(each: EffectPower) -> str:
+    return f"{each.share:.2%}" if each.share < _MOST else "not shown"
+
+
+def _joints(each: EffectPower) -> str:
+    return ", ".join(each.joints)
+
+
+def _asked_table(power: tuple[EffectPower, ...]) -> Table:
+    rows = tuple(
+        (each.kind, _joints(each), f"{each.size:.3g}", each.unit, f"{each.power:.0%}")
+        for each in power
+    )
+    return Table(
+        "Probability that these motions show it",
+        ("effect", "on", "size", "unit", "named"),
+        rows,
+        left=("effect", "on", "unit"),
+    )
+
+
+def power_data(power: tuple[EffectPower, ...]) -> list[dict[str, Any]]:
+    """Effects with the size that is named with the probability `power`; None: no size is."""
+    return [
+        {
+            "kind": each.kind,
+            "joints": list(each.joints),
+            "parameter": each.parameter,
+            "size": each.size if np.isfinite(each.size) else None,
+            "unit": each.unit,
+            "share_of_torque": each.share if np.isfinite(each.share) else None,
+            "power": each.power,
+        }
+        for each in power
+    ]
