@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from excite_cli.api.arguments import checked
+from excite_cli.api.foreign_motions import is_motion, measured_motions, read_segment
 from excite_cli.api.paths import paths_in, refuse_twice
 from excite_cli.base_link.wrench_rows import with_base
 from excite_cli.checks.bodies import bodies_in_words
@@ -26,7 +27,7 @@ from excite_cli.measurement.dataset import Dataset, Finding, merged
 from excite_cli.measurement.motors import motors_of
 from excite_cli.measurement.quality import raise_for_errors
 from excite_cli.robot.description import is_named
-from excite_cli.robot.model import Robot, build_measured_robot, build_robot
+from excite_cli.robot.model import Array, Robot, build_measured_robot, build_robot
 from excite_cli.robot.overview import describe
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.shown.record import Shown, show
@@ -89,6 +90,7 @@ def rebuilt_problem(
 
 # Share of a joint's torque on held-out data from which a fit is doubted.
 _MUCH_LEFT = 0.1
+_WORK = 500  # states of a log or plan that stand for all of them
 # A YAML file, or what it would hold.
 Config = str | Path | Mapping[str, Any]
 _LEVELS = {"note": Level.NOTE, "warning": Level.WARNING}
@@ -197,12 +199,42 @@ def problem_of(case: Problem | Case, tell: Tell = log_note) -> Problem:
 
 
 def _built(spec: Spec, folder: Path, file: Path | None, tell: Tell) -> Problem:
-    problem = replace(build_problem(spec, folder, fit_knowledge(spec, folder)), file=file)
+    work = _work(spec, folder, tell)
+    problem = replace(build_problem(spec, folder, fit_knowledge(spec, folder), work), file=file)
     for note in problem_notes(problem):
         tell(note)
     if spec.uncertainty is not None and spec.uncertainty.fit is not None:
         _doubt_fit(folder / spec.uncertainty.fit, tell)
     return problem
+
+
+def _work(spec: Spec, folder: Path, tell: Tell) -> tuple[Array, Array, Array] | None:
+    """q, v, a (N, n) of the log or the plan that `task` names; None where it names none.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read, or holds other joints.
+    """
+    name = spec.task.log or spec.task.plan
+    if name is None:
+        return None
+    path, key = folder / name, "log" if spec.task.log else "plan"
+    if not path.is_file():
+        raise FileError(f"task.{key}: there is no file {path}. Give one, or leave the key out.")
+    case = Case(spec, folder, build_robot(spec.robot, folder))
+    if is_motion(path, spec):
+        motions = [read_segment(path, case.robot, tell)]
+    else:
+        motions = measured_motions(spec, load_data(case, path, tell))
+    seconds = sum(each.trajectory.duration for each in motions)
+    parts = []
+    for each in motions:
+        duration = each.trajectory.duration
+        times = np.linspace(0.0, duration, max(2, round(_WORK * duration / seconds)))
+        parts.append(each.trajectory.states(times, each.coefficients))
+    q, v, a = (np.concatenate(series) for series in zip(*parts, strict=True))
+    return q, v, a
 
 
 def _doubt_fit(path: Path, tell: Tell) -> None:

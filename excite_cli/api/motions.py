@@ -7,18 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from excite_cli.api.arguments import checked
+from excite_cli.api.foreign_motions import is_motion as is_motion
+from excite_cli.api.foreign_motions import measured_motions, read_segment
 from excite_cli.api.loading import Case, dataset_of, load_data
 from excite_cli.config.load_spec import parse_spec
-from excite_cli.config.spec import Spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
-from excite_cli.identification.prepare import prepare_all
-from excite_cli.identification.processing import choose_processing
-from excite_cli.measurement.base_channel import channels_of_base
 from excite_cli.measurement.dataset import Dataset
-from excite_cli.measurement.motion_files import motion_reader_for, read_motion
-from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.model import Robot
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.diagnosis_file import is_diagnosis
 from excite_cli.store.fit_file import is_fit
@@ -27,12 +24,8 @@ from excite_cli.summary import motions as motions  # how they are shown
 from excite_cli.summary.pairs import doubts_in_words
 from excite_cli.trajectory.catalogue import build_trajectory
 from excite_cli.trajectory.fade import Segment
-from excite_cli.trajectory.sampled import through_samples
 
 Motions = Result | Segment | Sequence[Segment] | Dataset | str | Path
-
-# Share of the position limits from which positions are taken for another unit.
-_FAR_BEYOND = 4.0
 
 
 @checked("motions")
@@ -60,7 +53,7 @@ def load_motions(
     if isinstance(motions, Segment):
         return [_fitting(robot, motions)]
     if isinstance(motions, Dataset):
-        return _measured(problem, dataset_of(problem, motions))
+        return measured_motions(problem.spec, dataset_of(problem, motions))
     if not isinstance(motions, str | Path):
         return [_fitting(robot, each) for each in _listed(motions)]
     path = Path(motions)
@@ -71,11 +64,11 @@ def load_motions(
     if chosen and list(chosen) != [1]:
         raise FileError(f"--motion {chosen[0]}: {path} is not a result file; it holds one motion.")
     if is_motion(path, problem.spec):
-        return [_motion(path, robot, tell)]
+        return [read_segment(path, robot, tell)]
     data = load_data(problem, path, tell)
     text = f"{path}: measured positions, filtered as for identification, taken as motions"
     tell(Note(Level.INFO, text))
-    return _measured(problem, data)
+    return measured_motions(problem.spec, data)
 
 
 @checked()
@@ -110,22 +103,6 @@ def motions_of(
         Segment(f"motion_{index}", trajectory, there[index].coefficients)
         for index in dict.fromkeys(chosen or there)
     ]
-
-
-def is_motion(path: Path, spec: Spec | None = None) -> bool:
-    """Whether the file holds a motion in a controller's format, not measured data.
-
-    Raises
-    ------
-    FileError
-        There is no such file.
-    """
-    measured = ["tau"]
-    if spec is not None:
-        measured = [spec.measurement.channels.get("tau") or "tau"]
-        if "base" in spec.robot.rows:
-            measured += [channel.name for channel in channels_of_base(spec.measurement)]
-    return motion_reader_for(path, tuple(measured)) is not None
 
 
 def tell_doubts(result: Result, name: str, tell: Tell) -> None:
@@ -171,40 +148,3 @@ def _fitting(robot: Robot, motion: object) -> Segment:
     if coefficients.dtype.kind not in "fiu" or not np.isfinite(coefficients).all():
         raise FileError(f"{motion.name} has coefficients that are no finite numbers.")
     return replace(motion, coefficients=coefficients.astype(float))
-
-
-def _motion(path: Path, robot: Robot, tell: Tell) -> Segment:
-    motion, note = read_motion(path, robot.joint_names)
-    _refuse_degrees(path, motion.q, robot)
-    if note:
-        tell(Note(Level.INFO, f"{path}: {note}"))
-    missing = "speeds and accelerations" if motion.v is None else "accelerations"
-    if motion.v is None or motion.a is None:
-        text = f"its {missing} are those of a spline of degree 5 through the samples"
-        tell(Note(Level.INFO, f"{path}: {text}"))
-    return Segment(motion.name, *through_samples(motion.t, motion.q, motion.v, motion.a))
-
-
-def _refuse_degrees(path: Path, q: Array, robot: Robot) -> None:
-    """Positions (T, n) far beyond what the robot can reach are in another unit."""
-    limits = robot.limits
-    reach = np.maximum(np.abs(limits.lower), np.abs(limits.upper))
-    share = np.abs(q).max(axis=0) / np.where(np.isfinite(reach) & (reach > 0), reach, np.inf)
-    worst = int(np.argmax(share))
-    if share[worst] > _FAR_BEYOND:
-        raise FileError(
-            f"{path}: '{robot.joint_names[worst]}' reaches {np.abs(q[:, worst]).max():.3g}, its "
-            f"limits are {limits.lower[worst]:.3g} and {limits.upper[worst]:.3g}. Are these "
-            "degrees, or millimetres? Positions are in rad (m for prismatic joints)."
-        )
-
-
-def _measured(problem: Problem | Case, data: Dataset) -> list[Segment]:
-    spec = problem.spec
-    processing = choose_processing(data.runs, spec.measurement.filter, spec.diagnosis.moving_speed)
-    runs = prepare_all(data.runs, processing)
-    own = slice(data.runs[0].base_rows, None)  # what is planned are motions of the joints
-    return [
-        Segment(run.run.key, *through_samples(run.t, run.q[:, own], run.v[:, own], run.a[:, own]))
-        for run in runs
-    ]

@@ -99,13 +99,14 @@ def _child(node: Any, part: Any) -> tuple[int, Any] | None:
 
 
 def files_of_config(spec: Spec, folder: Path, config: Path | None) -> tuple[Path, ...]:
-    """The config (if it is a file), its URDF and the fit of `uncertainty.fit`, there or not.
+    """The config (if it is a file), its URDF and other files that it names, there or not.
 
     Relative paths start from `folder`.
     """
     named = [spec.robot.urdf]
     if spec.uncertainty is not None and spec.uncertainty.fit is not None:
         named.append(spec.uncertainty.fit)
+    named += [each for each in (spec.task.log, spec.task.plan) if each is not None]
     own = () if config is None else (config,)
     return (*own, *(folder / name for name in named))
 

@@ -40,8 +40,9 @@ def expectation(
     own = predicting(problem, tuple(asked))
     prediction = own.prediction
     assert prediction is not None
-    same = own is problem
-    stack = result.prior_stack if same else Stack.empty(own.columns)
+    earlier = result.prior_stack
+    same = own is problem and earlier.factor.shape[1] == own.columns
+    stack = earlier if same else Stack.empty(own.columns)
     objective, deviations = own.objective(), []
     for motion in result.motions:
         stack = stack.with_rows(objective.block(motion.coefficients))
@@ -55,7 +56,7 @@ def expectation(
     return Expectation(
         tuple(deviations),
         power if asked else sizes_shown(prediction, stack, alpha),
-        same or not result.prior_stack.rows,
+        same or not earlier.rows,
     )
 
 
@@ -75,7 +76,8 @@ def predicting(problem: Problem, kinds: Sequence[str] = ()) -> Problem:
         acceleration_bounds(problem.spec, problem.robot),
         problem.trajectory.duration,
         len(problem.cost_basis.times),
-        more=kinds,
+        problem.work,
+        kinds,
     )
     wide = replace(
         problem,

@@ -116,7 +116,9 @@ class Problem(Shown):
 
     `extension` holds the effects whose columns stand beside the base regressor. With a
     `separation` a motion is sought that tells effects apart, and `extension` has the rivals too.
-    Relative paths of `spec` start from `folder`, where `file` lies if it was read from one.
+    With a `prediction` motions are planned for the torques of the user's work; `work`: its states
+    q, v, a (N, n), where `task` names a file. Relative paths of `spec` start from `folder`, where
+    `file` lies if it was read from one.
     """
 
     spec: Spec
@@ -134,6 +136,7 @@ class Problem(Shown):
     separation: Separation | None = None
     metric: Array | None = None
     prediction: Prediction | None = None
+    work: tuple[Array, Array, Array] | None = None
     folder: Path = Path()
     file: Path | None = None
 
@@ -252,6 +255,7 @@ def build_problem(
         extension=extension,
         metric=metric,
         prediction=prediction,
+        work=work,
         folder=(relative_to or Path()).resolve(),
     )
     return on_fine_grid(problem) if extension.fine else problem

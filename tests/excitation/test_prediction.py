@@ -1,0 +1,222 @@
+"""Torques of the user's work: their variance, its gradient, and what motions would show."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from excite_cli.effects.catalogue import catalogue, kind_named
+from excite_cli.errors import ConfigError
+from excite_cli.excitation.expectation import expectation, predicting
+from excite_cli.excitation.gradient_check import check_gradient
+from excite_cli.excitation.not_modelled import not_modelled
+from excite_cli.excitation.power import power_of, price, sizes_shown
+from excite_cli.excitation.prediction import PredictedTorques, Prediction
+from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.stack import Stack
+from tests.excitation.smoke import drawn, planned, smoke
+
+FOR_WORK = "criterion.kind=predicted_torque"
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    return smoke(FOR_WORK)
+
+
+def of(problem: Problem) -> Prediction:
+    assert problem.prediction is not None
+    return problem.prediction
+
+
+def stacked(problem: Problem, *seeds: int) -> Stack:
+    objective, stack = problem.objective(), Stack.empty(problem.columns)
+    for seed in seeds:
+        stack = stack.with_rows(objective.block(drawn(problem, 0.3, seed)))
+    return stack
+
+
+def test_the_gradient_is_that_of_differences(problem: Problem) -> None:
+    assert check_gradient(problem).passed
+
+
+def test_the_gradient_is_right_where_more_than_the_joints_is_measured() -> None:
+    more = smoke(FOR_WORK, "robot.base=floating", "robot.rows=[base, joints]")
+    assert check_gradient(more).passed
+
+
+def test_the_deviation_is_that_of_drawn_parameters(problem: Problem) -> None:
+    """Parameters drawn from the prior, fitted to noisy rows: torques are off by the deviation."""
+    prediction, rng = of(problem), np.random.default_rng(5)
+    block = problem.objective().block(drawn(problem, 0.3, 1))
+    prior = prediction.prior
+    information = block.T @ block + prior.T @ prior
+    off = []
+    for _ in range(400):
+        z = np.linalg.solve(prior, rng.normal(size=len(prior)))
+        rows = block @ z + rng.normal(size=len(block))
+        off.append(prediction.work @ (np.linalg.solve(information, block.T @ rows) - z))
+    measured = np.sqrt(np.mean(np.square(off)))
+    told = prediction.deviation(Stack.empty(problem.columns).with_rows(block).factor)
+    assert told == pytest.approx(measured, rel=0.05)
+
+
+def test_the_criterion_is_the_logarithm_of_the_deviation(problem: Problem) -> None:
+    alpha, objective = drawn(problem, 0.3, 1), problem.objective()
+    assert isinstance(objective, PredictedTorques)
+    factor = stacked(problem, 1).factor
+    value = objective.value(alpha, problem.criterion)
+    assert value == pytest.approx(np.log(of(problem).deviation(factor)), abs=1e-9)
+
+
+def test_motions_make_it_smaller_and_earlier_data_count(problem: Problem) -> None:
+    deviations = [of(problem).deviation(stacked(problem, *range(k)).factor) for k in range(4)]
+    assert np.all(np.diff(deviations) < 0)
+    on_top = problem.objective(stacked(problem, 0)).value(drawn(problem, 0.3, 1), problem.criterion)
+    assert on_top == pytest.approx(np.log(of(problem).deviation(stacked(problem, 0, 1).factor)))
+
+
+def test_slow_work_is_predicted_better_and_needs_no_other_columns(problem: Problem) -> None:
+    slow = smoke(FOR_WORK, "task={speed: 0.2, acceleration: 0.1}")
+    factor = stacked(problem, 1).factor
+    assert of(slow).deviation(factor) < of(problem).deviation(factor)
+
+
+def test_a_longer_motion_of_as_many_instants_tells_more() -> None:
+    one, other = (of(smoke(FOR_WORK, f"task.rate={rate}")) for rate in (20, 80))
+    assert other.weighting.rows == pytest.approx(2.0 * one.weighting.rows)
+
+
+def test_weights_of_rows_are_the_noise_that_somebody_knows() -> None:
+    known = of(smoke(FOR_WORK, "criterion.row_weights={elbow: 4.0}"))
+    usual = of(smoke(FOR_WORK))
+    changed = known.weighting.rows / usual.weighting.rows
+    assert np.count_nonzero(np.abs(changed - 1.0) > 1e-9) == 1
+
+
+def test_condition_numbers_are_of_the_base_parameters_alone(problem: Problem) -> None:
+    alpha, objective = drawn(problem, 0.3, 1), problem.objective()
+    rank = problem.base.rank
+    own = objective.block(alpha)[:, :rank] / problem.weighting.columns
+    assert objective.own_condition_number(alpha) == pytest.approx(np.linalg.cond(own), rel=1e-6)
+
+
+def test_planned_for_the_work_it_is_predicted_better() -> None:
+    for_work, for_condition = (
+        planned(smoke(f"criterion.kind={kind}", "sequence.motions=1"))
+        for kind in ("predicted_torque", "condition_number")
+    )
+    judged = smoke(FOR_WORK)
+    found = [expectation(judged, each).deviations[-1] for each in (for_work, for_condition)]
+    assert found[0] < 0.9 * found[1]
+
+
+def test_figures_are_the_same_whatever_the_motions_were_planned_for(problem: Problem) -> None:
+    result = planned(smoke("sequence.motions=1", "optimizer.max_iterations=5"))
+    plain = smoke("sequence.motions=1")
+    assert expectation(plain, result).deviations == pytest.approx(
+        expectation(problem, result).deviations
+    )
+
+
+# Effects that motions would show.
+
+
+def test_an_effect_of_the_size_told_is_found_as_often_as_told(problem: Problem) -> None:
+    """By a likelihood ratio on drawn data, against the price; the other parameters are unknown."""
+    prediction, rng = of(problem), np.random.default_rng(3)
+    block = problem.objective().block(drawn(problem, 0.3, 1))
+    stack = Stack.empty(problem.columns).with_rows(block)
+    kind = "load_dependent_friction"
+    at = next(k for k, e in enumerate(prediction.extension.effects) if e.kind == kind)
+    column = int(prediction.first_columns[at])
+    shown = sizes_shown(prediction, stack, 0.01, power=0.8)[at]
+    size = shown.size / prediction.extension.scales[column - prediction.rank]
+    rest = np.delete(np.arange(problem.columns), column)
+    prior = prediction.prior
+    named = 0
+    for _ in range(400):
+        z = np.linalg.solve(prior, rng.normal(size=len(prior)))
+        z[column] = size
+        rows = np.concatenate([block @ z + rng.normal(size=len(block)), np.zeros(len(prior))])
+        both = np.vstack([block, prior])
+        both[len(block) :, column] = 0.0
+        saved = _left(both[:, rest], rows) - _left(both, rows)
+        named += saved > price(kind_named(kind), 0.01)
+    assert named / 400 == pytest.approx(0.8, abs=0.06)
+
+
+def _left(matrix: np.ndarray, rows: np.ndarray) -> float:
+    solution = np.linalg.lstsq(matrix, rows, rcond=None)[0]
+    return float(np.sum(np.square(rows - matrix @ solution)))
+
+
+def test_the_probability_of_a_size_goes_with_the_size_of_a_probability(problem: Problem) -> None:
+    prediction, stack = of(problem), stacked(problem, 1)
+    for each in sizes_shown(prediction, stack, 0.01):
+        if np.isfinite(each.size):
+            same = power_of(prediction, stack, 0.01, each.kind, each.size)
+            own = next(one for one in same if one.joints == each.joints)
+            assert own.power == pytest.approx(0.95, abs=1e-6)
+
+
+def test_more_motions_show_smaller_effects_and_none_show_nothing(problem: Problem) -> None:
+    prediction = of(problem)
+    few, more = (sizes_shown(prediction, stacked(problem, *s), 0.01) for s in ((1,), (1, 2, 3)))
+    assert all(a.size > b.size for a, b in zip(few, more, strict=True))
+    none = sizes_shown(prediction, Stack.empty(problem.columns), 0.01)
+    assert all(each.size > 1e3 * one.size for each, one in zip(none, few, strict=True))
+
+
+def test_what_surprises_more_costs_more() -> None:
+    kinds = catalogue()
+    dear, cheap = kinds["spring"], kinds["viscous_friction"]
+    assert price(dear, 0.01) - price(cheap, 0.01) == pytest.approx(dear.prior_cost)
+    assert price(cheap, 0.01) > chi2.isf(0.01, 1)
+
+
+def test_kinds_that_are_rare_are_in_where_somebody_asks(problem: Problem) -> None:
+    assert "spring" not in {each.kind for each in problem.extension.effects}
+    wide = predicting(problem, ("spring",))
+    assert "spring" in {each.kind for each in wide.extension.effects}
+
+
+def test_an_effect_that_no_motion_shows_is_refused_with_the_reason(problem: Problem) -> None:
+    with pytest.raises(ConfigError, match="backlash: no planned motion shows it"):
+        predicting(problem, ("backlash",))
+
+
+@pytest.mark.parametrize(
+    ("setting", "told"),
+    [
+        ("task={position: {elbw: [0, 1]}}", "no moved joint 'elbw'. Did you mean 'elbow'"),
+        ("task={position: {elbow: [1, 0]}}", "task.position.elbow: 1 is above 0"),
+        ("task={log: a.h5, speed: 0.5}", "log and position, speed, acceleration exclude"),
+        ("task={effects: [stribek_friction]}", "task.effects: there is no effect"),
+        ("task={plan: none.csv}", "task.plan: there is no file"),
+    ],
+)
+def test_a_task_that_cannot_be_says_why(setting: str, told: str) -> None:
+    with pytest.raises(Exception, match="task") as refused:
+        smoke(FOR_WORK, setting)
+    assert told in str(refused.value)
+
+
+# What no constraint knows of.
+
+
+def test_what_is_not_modelled_is_named() -> None:
+    bare = smoke("constraints={}")
+    assert [text.split(" (")[0] for text in not_modelled(bare)][:2] == [
+        "the floor and all else around the robot",
+        "the robot's own links",
+    ]
+    floor = smoke("constraints.surroundings={floor: -1.0}")
+    assert not_modelled(floor) == ("cables, hoses and tools that are not in the URDF",)
+    wall = "{walls: {behind: {point: [-2, 0, 0], normal: [1, 0, 0]}}}"
+    assert "the floor" in not_modelled(smoke(f"constraints.surroundings={wall}"))[0]
+
+
+def test_a_separation_has_no_prediction_beside_it(problem: Problem) -> None:
+    assert predicting(replace(problem, prediction=None)).separation is None
