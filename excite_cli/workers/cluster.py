@@ -42,20 +42,16 @@ _LIBRARIES = ("numpy", "scipy", "pin", "coal", "clarabel")
 
 @cache
 def environment() -> dict[str, str]:
-    """Versions of the libraries, the digest of our own source, whether its loops are compiled."""
+    """Versions of the libraries, the digest of our own source, which inner loops are in use."""
     versions = {"Python": platform.python_version(), "excite": _own_source()}
     for name in _LIBRARIES:
         try:
             versions[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             versions[name] = "none"
-    return {**versions, "kernels": _kernels()}
-
-
-def _kernels() -> str:
-    """Which inner loops are in use; by name, since their package is above this one."""
-    found = import_module("excite_cli.kernels.compiled").KERNELS
-    return "numpy" if found is None else "compiled"
+    # By its name, since that package is above this one.
+    loops = import_module("excite_cli.kernels.compiled").KERNELS
+    return {**versions, "kernels": "numpy" if loops is None else "compiled"}
 
 
 def _own_source() -> str:
@@ -153,7 +149,7 @@ class Cluster(Workers):
     @contextmanager
     def _round(self, function: Function, shared: Any) -> Iterator[Give]:
         blob = pickle.dumps(shared, pickle.HIGHEST_PROTOCOL)
-        futures = [self._submitted(_as_it_is, blob)]
+        futures = [self._submitted(bytes, blob)]
         common = (hashlib.sha256(blob).hexdigest(), futures[0])
 
         def give(task: Any, tell: Tell) -> Any:  # words of tasks are not heard from afar
@@ -230,10 +226,6 @@ async def _greet(address: str) -> None:
 
 def _there() -> tuple[dict[str, str], str]:
     return environment(), rounding()
-
-
-def _as_it_is(blob: bytes) -> bytes:
-    return blob
 
 
 def _do(key: str, shared: bytes, job: bytes, threads: int, versions: dict[str, str]) -> Answer:
