@@ -51,7 +51,7 @@ class _Process:
     def __init__(self, threads: int) -> None:
         ours, theirs = socket.socketpair()
         # What we have imported may be needed for tasks: it is imported before they come.
-        modules = [each for each in sys.modules if each.startswith(_OURS)]
+        modules = [each for each in list(sys.modules) if each.startswith(_OURS)]
         modules = [each for each in modules if not each.startswith(_NOT_NEEDED)]
         with ours, theirs:
             descriptor = theirs.fileno()
@@ -65,7 +65,7 @@ class _Process:
                 process_group=0,  # Ctrl-C is for the parent
             )
             self._connection = Connection(ours.detach())
-        self.pid = self._process.pid
+        self.pid, self.kill = self._process.pid, self._process.kill
         self.ready = False
 
     def answer(self, job: bytes, tell: Tell) -> Answer:
@@ -82,7 +82,7 @@ class _Process:
 
     def end(self) -> str:
         """Kill it, unless it has ended by itself; in words, how it ended."""
-        self._process.kill()
+        self.kill()
         status = self._process.wait()
         return f"killed by signal {-status}" if status < 0 else f"exit status {status}"
 
@@ -111,13 +111,15 @@ class Processes(Workers):
     def begin(self) -> None:
         """Start the processes."""
         self._closing = False
-        self._idle += [self._started() for _ in range(self._count - len(self._all))]
+        self._idle = [self._taken() for _ in range(self._count)]
 
     def close(self) -> None:
         """End all processes."""
         with self._lock:
             self._closing, ending = True, self._all
             self._all, self._idle = set(), []
+        for process in ending:
+            process.kill()  # all of them at once, then wait
         for process in ending:
             process.end()
 
@@ -141,7 +143,7 @@ class Processes(Workers):
     def _done(self, job: bytes, tell: Tell) -> Answer:
         """In a thread: have it done by an idle process, or by another one if that dies."""
         for _ in range(LOSSES):
-            process = self._idle.pop() if self._idle else self._started()
+            process = self._taken()
             try:
                 answer = process.answer(job, tell)
             except (EOFError, OSError):
@@ -160,10 +162,13 @@ class Processes(Workers):
             "take fewer."
         )
 
-    def _started(self) -> _Process:
+    def _taken(self) -> _Process:
+        """An idle process, else a new one."""
         with self._lock:
             if self._closing:
                 raise CancelledError
+            if self._idle:
+                return self._idle.pop()
             process = _Process(self._threads)
             self._all.add(process)
-        return process
+            return process
