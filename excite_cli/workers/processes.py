@@ -32,6 +32,7 @@ from excite_cli.workers.base import (
     Workers,
     packed,
 )
+from excite_cli.workers.worker_main import share_heap
 
 # The parent's path of imports comes first, so that a checkout finds itself; until it is set, `-P`
 # keeps the current folder out: a json.py that lies there is no part of us.
@@ -97,6 +98,7 @@ class Processes(Workers):
         self._all: set[_Process] = set()
         self._idle: list[_Process] = []
         self._lock, self._closing = Lock(), False
+        share_heap()
 
     @property
     def count(self) -> int:
