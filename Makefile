@@ -76,12 +76,11 @@ scoreboard: $(STAMP)     ## every tool on the same logs, one judge (docs/scorebo
 loops: $(STAMP)          ## campaigns on simulated robots, into docs/campaigns.md (two hours)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.closed_loops --page docs/campaigns.md
 
-trust: $(STAMP)          ## broken and hostile files, kills, full disks, determinism, stubborn programs (90 minutes; root)
+trust: $(STAMP)          ## broken and hostile files, kills, full disks, determinism (90 minutes; root)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.fuzz --count 10000
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.kill --kills 500
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.disk
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.determinism
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.trust.stubborn --times 20
 
 real: $(STAMP)           ## logs of six real robots, into the table of docs/results.md (three minutes)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.real_robots --markdown docs/results.md

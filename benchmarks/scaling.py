@@ -41,25 +41,16 @@ BEYOND = (8, 32, 128)
 _NOTHINGS = 300
 
 
-class Timed(Workers):
+class Timed:
     """Other workers, with the seconds spent in `map` and those of every start."""
 
     def __init__(self, inner: Workers) -> None:
         self.inner, self.inside = inner, 0.0
+        self.count = inner.count
         self.starts: list[float] = []
 
-    @property
-    def count(self) -> int:
-        return self.inner.count
-
     def map(
-        self,
-        function: Function,
-        shared: Any,
-        tasks: Sequence[Any],
-        watch: Watch = unwatched,
-        *,
-        keep_failures: bool = False,
+        self, function: Function, shared: Any, tasks: Sequence[Any], watch: Watch = unwatched
     ) -> list[Any]:
         def seen(news: News) -> None:
             if isinstance(news.result, FoundMotion):
@@ -67,12 +58,9 @@ class Timed(Workers):
             watch(news)
 
         began = time.perf_counter()
-        found = self.inner.map(function, shared, tasks, seen, keep_failures=keep_failures)
+        found = self.inner.map(function, shared, tasks, seen)
         self.inside += time.perf_counter() - began
         return found
-
-    def close(self) -> None:
-        self.inner.close()
 
 
 @dataclass(frozen=True)
@@ -90,7 +78,8 @@ def campaign(of: Problem, open_: Callable[[], Workers]) -> Measured:
     """From opening the workers to the finished motion."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     began = time.perf_counter()
-    with Timed(open_()) as workers:
+    with open_() as place:
+        workers = Timed(place)
         result = continue_run(
             of,
             new_result(of, [], {}),

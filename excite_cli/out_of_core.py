@@ -163,8 +163,9 @@ class Spool:
 
 def forget() -> None:
     """Give back the memory of all that lies on disk; reading it again fetches it."""
-    for each in list(_mapped):
-        if hasattr(each, "madvise"):
+    for reference in _mapped.keyrefs():  # a list at once: other threads may map more meanwhile
+        each = reference()
+        if each is not None and hasattr(each, "madvise"):
             each.madvise(mmap.MADV_DONTNEED)
 
 

@@ -1,22 +1,18 @@
 """Random and hostile inputs for every parser: `python -m benchmarks.trust.fuzz`.
 
-Each input is made from a seed and its number, so that `--replay NUMBER` makes it again. Workers are
-processes of their own: one that dies by a signal, or does not come back, is a fault of the input
-that it was at, and is replaced.
+Each input is made from a seed and its number, so that `--replay NUMBER` makes it again. They are
+tried in worker processes: one that dies by a signal, or does not come back, is a fault of the input
+that it was at, which is tried twice more.
 """
 
 import argparse
 import collections
+import faulthandler
 import json
 import os
-import shutil
-import signal
 import tempfile
-import time
-from collections.abc import Iterator
 from dataclasses import asdict
-from multiprocessing import get_context
-from multiprocessing.connection import Connection, wait
+from functools import cache
 from pathlib import Path
 
 from benchmarks.trust.data_files import (
@@ -28,6 +24,8 @@ from benchmarks.trust.data_files import (
 )
 from benchmarks.trust.robot_files import ConfigFuzzer, UrdfFuzzer
 from benchmarks.trust.trial import MOST_SECONDS, Fuzzer, Verdict, attempt, generator, protect
+from excite_cli.workers.base import Tell, Workers
+from excite_cli.workers.processes import Processes
 
 FUZZERS: dict[str, type[Fuzzer]] = {
     fuzzer.name: fuzzer
@@ -35,95 +33,45 @@ FUZZERS: dict[str, type[Fuzzer]] = {
         ConfigFuzzer, CsvFuzzer, Hdf5Fuzzer, ResultFuzzer, BagFuzzer, MotionFuzzer, UrdfFuzzer,
     )
 }  # fmt: skip
-_PATIENCE = 3 * MOST_SECONDS  # for what an alarm cannot interrupt
+_PATIENCE = 3 * MOST_SECONDS  # s, for what an alarm cannot interrupt: then the process ends
 
 
-def work(out: Connection, name: str, seed: int, bases: Path, numbers: range) -> None:
-    """In a worker: try inputs, and say of each that it begins and how it ended."""
+@cache
+def _opened(name: str, bases: Path) -> Fuzzer:
+    """The fuzzer, once in every worker."""
     fuzzer = FUZZERS[name]()
     fuzzer.open(bases)
     protect()
-    quiet = os.open(os.devnull, os.O_WRONLY)
-    for stream in (1, 2):
-        os.dup2(quiet, stream)  # libraries in C++ print there
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # libraries in C++ print there
+    return fuzzer
+
+
+def tried(shared: tuple[str, int, Path], number: int, tell: Tell) -> Verdict:
+    """In a worker: make an input and try it."""
+    name, seed, bases = shared
+    fuzzer = _opened(name, bases)
     with tempfile.TemporaryDirectory(prefix="fuzz_") as folder:
-        for number in numbers:
-            out.send(number)
-            out.send(_tried(fuzzer, seed, number, Path(folder)))
-
-
-def _tried(fuzzer: Fuzzer, seed: int, number: int, folder: Path) -> Verdict:
-    place = folder / "input"
-    place.mkdir()
-    try:
         try:
-            path, made = fuzzer.make(generator(seed, fuzzer, number), place)
+            path, made = fuzzer.make(generator(seed, fuzzer, number), Path(folder))
         except Exception as error:  # ours, and to be mended before anything is believed
             return Verdict(number, "-", "not made", repr(error)[:300])
-        return attempt(fuzzer, path, number, made)
-    finally:
-        shutil.rmtree(place, ignore_errors=True)
-
-
-class _Worker:
-    """A process that works off every n-th number; started again behind an input that ends it."""
-
-    def __init__(self, name: str, seed: int, bases: Path, numbers: range) -> None:
-        self.arguments = (name, seed, bases)
-        self.start(numbers)
-
-    def start(self, numbers: range) -> None:
-        """A new process for what is left."""
-        self.left, self.at, self.since = numbers, -1, time.monotonic()
-        processes = get_context("spawn")
-        self.pipe, theirs = processes.Pipe(duplex=False)
-        self.process = processes.Process(target=work, args=(theirs, *self.arguments, numbers))
-        self.process.start()
-        theirs.close()
-
-    def heard(self) -> Verdict | None:
-        """A verdict, if one has come; the process's own end is one where it died."""
-        self.since = time.monotonic()
+        faulthandler.dump_traceback_later(_PATIENCE, exit=True)
         try:
-            said = self.pipe.recv()
-        except EOFError:
-            return self._ended()
-        if isinstance(said, Verdict):
-            return said
-        self.at = said
-        return None
-
-    def _ended(self) -> Verdict | None:
-        self.process.join()
-        status, left = self.process.exitcode or 0, self.left
-        self.left = range(0)
-        if status == 0:
-            return None
-        if self.at < 0:
-            raise SystemExit(f"a worker of {self.arguments[0]} did not start (status {status})")
-        word = signal.Signals(-status).name if status < 0 else f"status {status}"
-        lost = Verdict(self.at, "-", word, "the process died")
-        if rest := range(self.at + left.step, left.stop, left.step):
-            self.start(rest)
-        return lost
-
-    def end_if_late(self) -> None:
-        """Kill it where it has not come back for too long."""
-        if self.at >= 0 and time.monotonic() - self.since > _PATIENCE:
-            self.process.kill()
+            return attempt(fuzzer, path, number, made)
+        finally:
+            faulthandler.cancel_dump_traceback_later()
 
 
-def run(name: str, count: int, seed: int, workers: int, bases: Path) -> Iterator[Verdict]:
-    """Try `count` inputs of a parser."""
+def run(name: str, count: int, seed: int, workers: Workers, bases: Path) -> list[Verdict]:
+    """Try `count` inputs of a parser; the end of a worker is a fault of its input."""
+    from benchmarks.trust.fuzz import tried  # workers import it by this name, not from __main__
+
     FUZZERS[name]().prepare(bases)
-    crew = [_Worker(name, seed, bases, range(k, count, workers)) for k in range(workers)]
-    while busy := [worker for worker in crew if worker.left]:
-        ready = wait([worker.pipe for worker in busy], timeout=1.0)
-        for worker in busy:
-            if worker.pipe not in ready:
-                worker.end_if_late()
-            elif (verdict := worker.heard()) is not None:
-                yield verdict
+    found = workers.map(tried, (name, seed, bases), range(count), keep_failures=True)
+    return [
+        each if isinstance(each, Verdict) else Verdict(k, "-", type(each).__name__, str(each))
+        for k, each in enumerate(found)
+    ]
 
 
 def _replay(name: str, seed: int, number: int, bases: Path, keep: Path | None) -> None:
@@ -175,7 +123,8 @@ def main() -> int:
             return 0
         print("parser    inputs  accepted  refused  faults  seconds  cpu [s]  peak [MiB]")
         for name in FUZZERS if asked.parser == "all" else [asked.parser]:
-            found[name] = list(run(name, asked.count, asked.seed, asked.workers, Path(folder)))
+            with Processes(asked.workers) as workers:  # of one parser: libraries keep their state
+                found[name] = run(name, asked.count, asked.seed, workers, Path(folder))
             faults += _tell(name, found[name])
     if asked.json is not None:
         data = {name: [asdict(each) for each in verdicts] for name, verdicts in found.items()}

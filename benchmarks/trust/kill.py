@@ -2,21 +2,18 @@
 
     python -m benchmarks.trust.kill --kills 500 --seed 1
 
-Each command runs as the installed program in a session of its own and is killed with SIGKILL, seven
-times of ten at one of the events in the folder that it writes to (a temporary file is made, filled,
-closed, moved …), else at any instant of its run. Half of all series begin with an old output. A
-series kills up to five times in one folder, `optimize --resume` among them, and then lets a run
-end: its numbers must be those of an undisturbed run, to the last bit. With --forked the program is
-started as a copy of a process that has imported everything, which saves seconds for every kill.
+Each command runs in a session of its own, as a copy of a process that has imported everything, and
+is killed with SIGKILL, seven times of ten at one of the events in the folder that it writes to (a
+temporary file is made, filled, closed, moved …), else at any instant of its run. Half of all series
+begin with an old output. A series kills up to five times in one folder, `optimize --resume` among
+them, and then lets a run end: its numbers must be those of an undisturbed run, to the last bit.
 """
 
 import argparse
 import importlib
 import os
 import pkgutil
-import re
 import shutil
-import signal
 import sys
 import tempfile
 import time
@@ -30,12 +27,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from benchmarks.trust.kill_commands import COMMANDS, INPUTS, Command
-from benchmarks.trust.killing import Reference, Series, Start, Tally, forked, installed, undisturbed
+from benchmarks.trust.killing import Reference, Series, Tally, forked, undisturbed
 
 IN_ONE_FOLDER = 5  # kills
-_KEY, _OTHER = "0" * 32, "1" * 32
-_LONGEST = 0.15  # s
-_LEFT = re.compile(r"\.meshes-[01]+\.npz\.(lock|[a-z0-9_]{8}\.part)")
 _SEED_OF_OLD = "77"
 _SHARES = {
     "optimize": 8.0,
@@ -53,38 +47,30 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--only", help="this command alone")
-    parser.add_argument("--forked", action="store_true")
     asked = parser.parse_args()
     commands = [each for each in COMMANDS if asked.only in (None, each.name)]
-    start = forked if asked.forked else installed
-    if asked.forked:
-        import_everything()
+    import_everything()
     root = Path(tempfile.mkdtemp(prefix="excite-kill-"))
     try:
         os.environ["XDG_CACHE_HOME"] = str(root / "cache")
-        sys.exit(_campaign(commands, start, root, asked.kills, asked.seed, asked.workers))
+        sys.exit(_campaign(commands, root, asked.kills, asked.seed, asked.workers))
     finally:
         shutil.rmtree(root, ignore_errors=True)
 
 
-def _campaign(
-    commands: list[Command], start: Start, root: Path, kills: int, seed: int, workers: int
-) -> int:
+def _campaign(commands: list[Command], root: Path, kills: int, seed: int, workers: int) -> int:
     began = time.monotonic()
     make_inputs(root)
     counts = _counts(commands, kills)
     tallies = {each.name: Tally() for each in commands}
     with ProcessPoolExecutor(workers, get_context("fork")) as pool:
         waiting = [
-            (each.name, pool.submit(_command, each, start, root / f"{i}", counts[each.name], seed))
+            (each.name, pool.submit(_command, each, root / f"{i}", counts[each.name], seed))
             for i, each in enumerate(commands)
         ]
         for name, each in waiting:
             tallies[name].add(each.result())
             _tell(name, tallies[name])
-    if len(commands) == len(COMMANDS):
-        tallies["caches"] = kill_caches(root / "killed-caches", max(20, kills // 10), seed)
-        _tell("caches", tallies["caches"])
     total = Tally()
     for tally in tallies.values():
         total.add(tally)
@@ -100,7 +86,7 @@ def make_inputs(root: Path) -> None:
     (root / "make").mkdir()
     (root / "inputs").mkdir()
     for command in INPUTS:
-        made = undisturbed(installed, command, root / "made").folder
+        made = undisturbed(forked, command, root / "made").folder
         for each in made.iterdir():
             each.rename(root / "inputs" / each.name)
         made.rmdir()
@@ -113,16 +99,16 @@ def _counts(commands: list[Command], kills: int) -> dict[str, int]:
     return {name: max(1, round(kills * share / whole)) for name, share in shares.items()}
 
 
-def _command(command: Command, start: Start, root: Path, kills: int, seed: int) -> Tally:
+def _command(command: Command, root: Path, kills: int, seed: int) -> Tally:
     """All series of one command, until it was killed `kills` times."""
     root.mkdir()
     (root / "inputs").symlink_to(root.parent / "inputs")
-    reference = undisturbed(start, command, root / "reference")
-    old = _old(command, start, reference, root)
+    reference = undisturbed(forked, command, root / "reference")
+    old = _old(command, reference, root)
     rng, tally, number = np.random.default_rng([seed, len(command.name), kills]), Tally(), 0
     while tally.kills < kills and not tally.broken:
         folder = root / f"series-{number}"
-        series = Series(start, command, reference, folder, old if number % 2 else None)
+        series = Series(forked, command, reference, folder, old if number % 2 else None)
         tally.add(series.play(min(IN_ONE_FOLDER, kills - tally.kills), rng))
         if not tally.broken:
             shutil.rmtree(folder)
@@ -130,13 +116,13 @@ def _command(command: Command, start: Start, root: Path, kills: int, seed: int) 
     return tally
 
 
-def _old(command: Command, start: Start, reference: Reference, root: Path) -> Path:
+def _old(command: Command, reference: Reference, root: Path) -> Path:
     """Files from before: for a command that resumes, those of another seed."""
     if not command.resumable:
         return reference.folder
     arguments = (*command.arguments, "--seed", _SEED_OF_OLD)
     return undisturbed(
-        start, Command(command.name, arguments, command.outputs), root / "old"
+        forked, Command(command.name, arguments, command.outputs), root / "old"
     ).folder
 
 
@@ -148,61 +134,6 @@ def import_everything() -> None:
             importlib.import_module(module.name)
     for name in ("matplotlib.pyplot", "mujoco", "rosbags.rosbag2", "PIL.Image", "embreex"):
         importlib.import_module(name)
-
-
-def kill_caches(folder: Path, kills: int, seed: int) -> Tally:
-    """Kill `kills` processes that write both caches in turn; what is read is whole or nothing."""
-    from excite_cli.disk_cache import store_arrays, stored_arrays
-    from excite_cli.geometry.capsules import store_capsules, stored_capsules
-    from excite_cli.robot.capsule import Capsule
-
-    rng, tally = np.random.default_rng(seed), Tally()
-    ends = rng.normal(size=(300, 2, 3))
-    capsules = [Capsule(f"link{i}", i, a, b, 0.1, (f"link{i}",)) for i, (a, b) in enumerate(ends)]
-    arrays = {"values": rng.normal(size=(200, 200)), "axis": np.arange(9.0)}
-    os.environ["XDG_CACHE_HOME"] = str(folder)
-    inner = folder / "excite"
-    for _ in range(kills):
-        process = os.fork()
-        if not process:
-            while True:
-                store_capsules(_OTHER, capsules)
-                store_arrays(_KEY, arrays)
-                for each in inner.glob("m*"):
-                    each.unlink()
-        time.sleep(float(rng.uniform(0.0, _LONGEST)))
-        os.kill(process, signal.SIGKILL)
-        os.waitpid(process, 0)
-        tally.kills += 1
-        found, read = stored_capsules(_OTHER, 0), stored_arrays(_KEY)
-        paths = (inner / f"meshes-{_OTHER}.npz", inner / f"meshes-{_KEY}.npz")
-        for path, content in zip(paths, (found, read), strict=True):
-            if path.exists() and content is None:
-                tally.broken.append(f"{path.name} is broken")
-        whole = [each is not None for each in (found, read)]
-        state = "absent" if not any(whole) else "new" if all(whole) else "mixed"
-        tally.states[state] = tally.states.get(state, 0) + 1
-        if read is not None and any((read[name] != arrays[name]).any() for name in arrays):
-            tally.broken.append("the table has other numbers")
-        if found is not None and any(
-            (a.start != b.start).any() for a, b in zip(found, capsules, strict=True)
-        ):
-            tally.broken.append("the capsules have other numbers")
-        left = (
-            [each.name for each in inner.iterdir() if each.name.startswith(".")]
-            if inner.exists()
-            else []
-        )
-        tally.writing += any(name.endswith(".part") for name in left)
-        tally.broken += [f"{name} was left" for name in left if not _LEFT.fullmatch(name)]
-    left = len(list(inner.glob(".*.part")))
-    store_capsules(_OTHER, capsules)
-    store_arrays(_KEY, arrays)
-    over = [each.name for each in inner.iterdir() if each.name.startswith(".")]
-    if over or stored_capsules(_OTHER, 0) is None or stored_arrays(_KEY) is None:
-        tally.broken.append(f"left after the last run: {', '.join(over)}")
-    tally.swept, tally.finished = left, 1
-    return tally
 
 
 def _tell(name: str, tally: Tally) -> None:

@@ -7,7 +7,6 @@ import select
 import shutil
 import signal
 import struct
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -48,29 +47,13 @@ class Ended:
 Start = Callable[[Sequence[str], Path, Mapping[str, str]], int]
 
 
-def installed(arguments: Sequence[str], folder: Path, environment: Mapping[str, str]) -> int:
-    """The installed program in a session of its own; returns its process."""
-    program = shutil.which("excite", path=f"{Path(sys.executable).parent}:{os.defpath}")
-    assert program is not None, "excite is not installed"
-    with (folder.parent / "said.txt").open("w") as said:
-        return subprocess.Popen(
-            [program, *arguments],
-            cwd=folder,
-            env={**os.environ, **environment},
-            stdin=subprocess.DEVNULL,
-            stdout=said,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        ).pid
-
-
 def forked(
     arguments: Sequence[str],
     folder: Path,
     environment: Mapping[str, str],
     powerless: bool = False,
 ) -> int:
-    """The same from a copy of this process, which has imported everything: seconds are saved.
+    """The program as a copy of this process, in a session of its own; returns its process id.
 
     `powerless`: without the rights of root, to whom no folder is closed.
     """

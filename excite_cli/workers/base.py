@@ -8,12 +8,13 @@ done, nor whether one is done twice because a worker was lost.
 
 import io
 import pickle
-import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sized
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from types import TracebackType
+from queue import SimpleQueue
 from typing import Any, Self
 
 import numpy as np
@@ -56,46 +57,18 @@ class _Packer(pickle.Pickler):
         return NotImplemented if reference is None else (attached, (reference,))
 
 
-# Exceptions that travel from a worker to the caller.
-
-
-def able_to_travel(error: Exception) -> Exception:
-    """The error itself with its traceback as a note, or the nearest that can be pickled.
-
-    An exception whose constructor wants more than its message does not come back from a pickle;
-    then its first base class that does is taken, with the same message.
-    """
-    if not isinstance(error, ExciteError):
-        error.add_note("In a worker:\n" + "".join(traceback.format_exception(error)))
-    for kind in (None, *type(error).__mro__):
-        try:
-            candidate = error if kind is None else _as(error, kind)
-            back = pickle.loads(pickle.dumps(candidate))
-        except Exception:  # whatever a foreign exception does when it is pickled
-            continue
-        if isinstance(back, Exception) and str(back) == str(error):
-            return candidate
-    return RuntimeError(f"{type(error).__name__}: {error}")
-
-
-def _as(error: Exception, kind: type) -> Exception:
-    other = kind(str(error))
-    if not isinstance(other, Exception):
-        raise TypeError(kind)
-    for note in getattr(error, "__notes__", ()):
-        other.add_note(note)
-    return other
-
-
 Tell = Callable[[Any], None]
 Function = Callable[[Any, Any, Tell], Any]
-
-# How often a task may take its worker with it before it is given up.
-LOSSES = 3
+Answer = tuple[str, Any]  # ("done", result) or ("failed", error)
+Give = Callable[[Any, Tell], Any]  # (task, tell) → a future of its answer
 
 
 class LostWorkersError(ExciteError):
-    """Workers end again and again, or cannot be started."""
+    """A task takes its worker with it each time."""
+
+
+class NoWorkersError(ExciteError):
+    """There are no workers, or they cannot do our tasks."""
 
 
 @dataclass(frozen=True)
@@ -125,12 +98,19 @@ def unwatched(news: News) -> None:
 class Workers(ABC):
     """A place where tasks are done; to be closed, best with `with`."""
 
+    reads_our_files = False  # what lies on the disk of this process is named, and not copied
+    in_this_thread = False
+
     @property
     @abstractmethod
     def count(self) -> int:
         """How many tasks are done at once."""
 
-    @abstractmethod
+    @property
+    def ahead(self) -> int:
+        """How many tasks are given at once."""
+        return self.count
+
     def map(
         self,
         function: Function,
@@ -142,20 +122,53 @@ class Workers(ABC):
     ) -> list[Any]:
         """`function(shared, task, tell)` of every task, in their order.
 
-        `watch` is called in the caller's thread whenever a task ends or tells a word. If tasks
-        raise, the exception of the first one (in their order) is raised, and the rest is not done;
-        with `keep_failures` an exception stands in the place of a result, and the rest is done.
+        The next of `tasks` is taken when a worker is there to do it. `watch` is called in the
+        caller's thread whenever a task ends or tells a word. If tasks raise, the exception of the
+        first one (in their order) is raised, and the rest is not done; with `keep_failures` an
+        exception stands in the place of a result, and the rest is done.
 
         Raises
         ------
         LostWorkersError
-            A task takes its worker with it each time, or workers cannot be started.
+            A task takes its worker with it each time.
+        NoWorkersError
+            There are no workers, or they cannot do our tasks.
         """
+        total = len(tasks) if isinstance(tasks, Sized) else None
+        if total == 0:
+            return []
+        state = _Map(self, watch, total, keep_failures)
+        heard: SimpleQueue[tuple[int, Any, Any]] = SimpleQueue()  # task, its word or its future
+        source = enumerate(tasks)
 
-    @property
-    def reads_our_files(self) -> bool:
-        """Whether what lies on the disk of this process is named to the workers and not copied."""
-        return False
+        def tell(index: int) -> Tell:
+            if self.in_this_thread:
+                return partial(state.hear, index)
+            return lambda word: heard.put((index, word, None))
+
+        with self._round(function, shared) as give:
+            while True:
+                while len(state.running) < self.ahead and not state.failures:
+                    index, task = next(source, (-1, None))
+                    if index < 0:
+                        break
+                    state.running.add(index)
+                    future = give(task, tell(index))
+                    future.add_done_callback(lambda it, k=index: heard.put((k, None, it)))
+                if not state.awaited:
+                    break
+                state.hear(*heard.get())
+            if state.failures:
+                raise state.failures[min(state.failures)]
+        return [state.results[index] for index in sorted(state.results)]
+
+    @abstractmethod
+    def _round(self, function: Function, shared: Any) -> AbstractContextManager[Give]:
+        """Within the block, how a task is given; what still runs at its end is dropped."""
+
+    def answer(self, future: Any) -> Answer:
+        """What became of a task that has ended, or raises `LostWorkersError`."""
+        return future.result()
 
     def begin(self) -> None:  # noqa: B027 - most need not
         """Make ready for the first tasks, where that takes a while; not needed."""
@@ -167,10 +180,44 @@ class Workers(ABC):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         self.close()
+
+
+@dataclass
+class _Map:
+    """The state of one `map`."""
+
+    workers: Workers
+    watch: Watch
+    total: int | None
+    keep_failures: bool
+    running: set[int] = field(default_factory=set)
+    results: dict[int, Any] = field(default_factory=dict)
+    failures: dict[int, Exception] = field(default_factory=dict)
+
+    @property
+    def awaited(self) -> bool:
+        """Whether a task runs whose end matters: after a failure, only those before it do."""
+        return any(index < min(self.failures, default=index + 1) for index in self.running)
+
+    def hear(self, index: int, word: Any, ended: Any = None) -> None:
+        """A word of a task, or the future of one that has ended."""
+        given = len(self.results) + len(self.failures) + len(self.running)
+        total = given if self.total is None else self.total
+        result = None
+        if ended is not None:
+            self.running.discard(index)
+            try:
+                kind, result = self.workers.answer(ended)
+            except LostWorkersError as error:
+                text = f"Task {index + 1} of {total} was given up: {error}"
+                kind, result = "failed", LostWorkersError(text)
+            if isinstance(result, NoWorkersError):
+                raise result
+            if kind == "failed" and not self.keep_failures:
+                self.failures[index] = result
+                return
+            self.results[index] = result
+        running = min(len(self.running), self.workers.count)
+        self.watch(News(len(self.results), running, total, index, word, result))

@@ -9,29 +9,27 @@ import hashlib
 import logging
 import pickle
 import platform
-import struct
-import threading
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
-from dataclasses import dataclass
+from contextlib import contextmanager
 from functools import cache
 from importlib import import_module, metadata
 from pathlib import Path
 from typing import Any
 
 import excite_cli
-from excite_cli.errors import ExciteError, MissingExtraError
+from excite_cli.errors import MissingExtraError
 from excite_cli.workers.base import (
+    Answer,
     Function,
+    Give,
     LostWorkersError,
-    News,
-    Watch,
+    NoWorkersError,
+    Tell,
     Workers,
-    able_to_travel,
-    unwatched,
 )
-from excite_cli.workers.worker_main import keep_memory
+from excite_cli.workers.worker_main import keep_memory, outcome
 
 # What must be the same on every machine that takes part, and what better is.
 #
@@ -42,43 +40,18 @@ from excite_cli.workers.worker_main import keep_memory
 _LIBRARIES = ("numpy", "scipy", "pin", "coal", "clarabel")
 
 
-@dataclass(frozen=True)
-class Environment:
-    """Versions of the libraries, the digest of our own source, and how numbers are rounded.
-
-    Among the versions is whether the inner loops are the compiled ones.
-    """
-
-    versions: tuple[tuple[str, str], ...]
-    rounding: str
-
-    def against(self, other: "Environment") -> str:
-        """In words, what differs from `other` and must not; empty if nothing does."""
-        mine, theirs = dict(self.versions), dict(other.versions)
-        return ", ".join(
-            f"{name} {mine[name]} here, {theirs.get(name, 'none')} there"
-            for name in mine
-            if mine[name] != theirs.get(name)
-        )
-
-
 @cache
-def environment() -> Environment:
-    """Those of this process."""
-    versions = [("Python", platform.python_version()), ("excite", _own_source())]
+def environment() -> dict[str, str]:
+    """Versions of the libraries, the digest of our own source, which inner loops are in use."""
+    versions = {"Python": platform.python_version(), "excite": _own_source()}
     for name in _LIBRARIES:
         try:
-            versions.append((name, metadata.version(name)))
+            versions[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
-            versions.append((name, "none"))
-    versions.append(("kernels", _kernels()))
-    return Environment(tuple(versions), _rounding())
-
-
-def _kernels() -> str:
-    """Which inner loops are in use; by name, since their package is above this one."""
-    found = import_module("excite_cli.kernels.compiled").KERNELS
-    return "numpy" if found is None else "compiled"
+            versions[name] = "none"
+    # By its name, since that package is above this one.
+    loops = import_module("excite_cli.kernels.compiled").KERNELS
+    return {**versions, "kernels": "numpy" if loops is None else "compiled"}
 
 
 def _own_source() -> str:
@@ -90,14 +63,13 @@ def _own_source() -> str:
     return f"{excite_cli.__version__} ({digest.hexdigest()[:8]})"
 
 
-def _rounding() -> str:
+def rounding() -> str:
     """Digest of a small computation of each kind that the program does."""
     import numpy as np
     from scipy.linalg import cho_factor, cho_solve, qr
     from threadpoolctl import threadpool_limits
 
-    rng = np.random.default_rng(1)
-    a = rng.normal(size=(200, 60))
+    a = np.random.default_rng(1).normal(size=(200, 60))
     digest = hashlib.sha256()
     with threadpool_limits(limits=1):
         gram = a.T @ a
@@ -111,24 +83,17 @@ def _rounding() -> str:
             np.array([a.sum()]),
         ]
     for part in parts:
-        digest.update(struct.pack(f"{part.size}d", *np.ascontiguousarray(part).ravel()))
+        digest.update(np.ascontiguousarray(part).tobytes())
     return digest.hexdigest()[:12]
 
 
 _ANSWER, _FIRST_WORKER = 5.0, 10.0  # [s] to wait for the scheduler, and for a worker
 _FAMILIAR = ("tcp://", "tls://", "ws://", "wss://", "inproc://", "ucx://")
 _TALKATIVE = ("", ".client", ".core", ".comm", ".utils")
-# What a worker's thread has unpickled last: threads must not share a problem.
-_held = threading.local()
 
 
-class ClusterError(ExciteError):
+class ClusterError(NoWorkersError):
     """No cluster at the address, or one that cannot do our tasks."""
-
-
-@dataclass(frozen=True)
-class _Failure:
-    error: Exception
 
 
 class Cluster(Workers):
@@ -172,82 +137,73 @@ class Cluster(Workers):
         """Tasks that the workers of now do at once."""
         return max(1, sum(self._client.nthreads().values()))
 
-    def map(
-        self,
-        function: Function,
-        shared: Any,
-        tasks: Iterable[Any],
-        watch: Watch = unwatched,
-        *,
-        keep_failures: bool = False,
-    ) -> list[Any]:
-        """As `Workers.map`; words of tasks are not told."""
-        from distributed import as_completed
-
-        tasks = list(tasks)
-        if not tasks:
-            return []
-        blob = pickle.dumps(shared, pickle.HIGHEST_PROTOCOL)
-        digest = hashlib.sha256(blob).hexdigest()
-        with warnings.catch_warnings():  # recordings are large, and travel once
-            warnings.filterwarnings("ignore", "Sending large graph")
-            held = self._client.submit(_as_it_is, blob, pure=False)
-            futures = [
-                self._client.submit(
-                    _do, digest, held, function, task, self._threads, environment(), pure=False
-                )
-                for task in tasks
-            ]
-        place = {future.key: index for index, future in enumerate(futures)}
-        done = 0
-        try:
-            for future in as_completed(futures, loop=self._client.loop):
-                index = place[future.key]
-                result = self._result(future, index, len(tasks))
-                if isinstance(result, _Failure):
-                    if not keep_failures or isinstance(result.error, ClusterError):
-                        break
-                    result = result.error
-                done += 1
-                running = min(self.count, len(tasks) - done)
-                watch(News(done, running, len(tasks), index, result=result))
-            found: list[Any] = []
-            for index, future in enumerate(futures):  # the first that failed, whoever was ready
-                result = self._result(future, index, len(tasks))
-                if isinstance(result, _Failure):
-                    if not keep_failures or isinstance(result.error, ClusterError):
-                        raise result.error
-                    result = result.error
-                found.append(result)
-            return found
-        finally:
-            self._client.cancel([held, *futures], force=True)
+    @property
+    def ahead(self) -> int:
+        """Twice as many as are done at once: the next one is there when one ends."""
+        return 2 * self.count
 
     def close(self) -> None:
         """Leave the cluster; it goes on running."""
         self._client.close()
 
+    @contextmanager
+    def _round(self, function: Function, shared: Any) -> Iterator[Give]:
+        blob = pickle.dumps(shared, pickle.HIGHEST_PROTOCOL)
+        futures = [self._submitted(bytes, blob)]
+        common = (hashlib.sha256(blob).hexdigest(), futures[0])
+
+        def give(task: Any, tell: Tell) -> Any:  # words of tasks are not heard from afar
+            job = pickle.dumps((function, task), pickle.HIGHEST_PROTOCOL)
+            futures.append(self._submitted(_do, *common, job, self._threads, environment()))
+            return futures[-1]
+
+        try:
+            yield give
+        finally:
+            self._client.cancel(futures, force=True)
+
+    def _submitted(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        with warnings.catch_warnings():  # recordings are large, and travel once
+            warnings.filterwarnings("ignore", "Sending large graph")
+            return self._client.submit(function, *arguments, pure=False)
+
+    def answer(self, future: Any) -> Answer:
+        """As `Workers.answer`; `ClusterError` if no more can be done."""
+        from distributed import KilledWorker
+
+        try:
+            return future.result()
+        except KilledWorker as error:
+            raise LostWorkersError(
+                "each time its worker was lost while doing it "
+                f"({error.last_worker.address}). Often memory is short there."
+            ) from error
+        except CancelledError as error:
+            raise self._refusal(
+                "the scheduler is gone. Start it again; with --resume what is done already is kept."
+            ) from error
+        except ImportError as error:
+            raise self._refusal(
+                f"a worker cannot do the task ({error}). Install the same excite there."
+            ) from error
+
     def _meet(self, warn: Callable[[str], None]) -> None:
+        """See that there are workers, and that they compute as this process does."""
         try:
             self._client.wait_for_workers(1, timeout=_FIRST_WORKER)
+            there = self._client.run(_there)
         except TimeoutError as error:
-            raise ClusterError(
-                f"--scheduler {self.address}: it has no workers. Start some: dask worker "
-                f"{self.address} --nthreads 1"
+            raise self._refusal(
+                f"it has no workers. Start some: dask worker {self.address} --nthreads 1"
             ) from error
-        try:
-            there: dict[str, Environment] = self._client.run(_there)
         except ImportError as error:
-            raise ClusterError(
-                f"--scheduler {self.address}: its workers do not have excite ({error}). Install "
-                "it where they run."
+            raise self._refusal(
+                f"its workers do not have excite ({error}). Install it where they run."
             ) from error
-        here = environment()
-        for worker, found in there.items():
-            differs = here.against(found)
-            if differs:
-                raise ClusterError(_other_versions(worker, differs))
-        others = [worker for worker, found in there.items() if found.rounding != here.rounding]
+        for worker, (versions, _) in there.items():
+            _check_versions(worker, environment(), versions)
+        here = rounding()
+        others = [worker for worker, (_, digest) in there.items() if digest != here]
         if others:
             more = f" and {len(others) - 1} more" if len(others) > 1 else ""
             warn(
@@ -256,34 +212,8 @@ class Cluster(Workers):
                 "NPY_DISABLE_CPU_FEATURES for all of them can make them the same."
             )
 
-    def _result(self, future: Any, index: int, total: int) -> Any:
-        """The result, or what was raised instead."""
-        from distributed import KilledWorker
-
-        try:
-            kind, value = future.result()
-        except KilledWorker as error:
-            return _Failure(
-                LostWorkersError(
-                    f"Task {index + 1} of {total} was given up: each time its worker was lost "
-                    f"while doing it ({error.last_worker.address}). Often memory is short there."
-                )
-            )
-        except CancelledError:
-            return _Failure(
-                ClusterError(
-                    f"--scheduler {self.address}: the scheduler is gone. Start it again; with "
-                    "--resume what is done already is kept."
-                )
-            )
-        except ImportError as error:
-            return _Failure(
-                ClusterError(
-                    f"--scheduler {self.address}: a worker cannot do the task ({error}). Install "
-                    "the same excite there."
-                )
-            )
-        return value if kind == "done" else _Failure(value)
+    def _refusal(self, text: str) -> ClusterError:
+        return ClusterError(f"--scheduler {self.address}: {text}")
 
 
 async def _greet(address: str) -> None:
@@ -294,44 +224,35 @@ async def _greet(address: str) -> None:
         await scheduler.identity()
 
 
-def _there() -> Environment:
-    return environment()
+def _there() -> tuple[dict[str, str], str]:
+    return environment(), rounding()
 
 
-def _as_it_is(blob: bytes) -> bytes:
-    return blob
-
-
-def _do(
-    digest: str, blob: bytes, function: Function, task: Any, threads: int, asked: Environment
-) -> tuple[str, Any]:
+def _do(key: str, shared: bytes, job: bytes, threads: int, versions: dict[str, str]) -> Answer:
     """One task, in a worker of the cluster."""
+    from distributed import get_worker
     from threadpoolctl import threadpool_limits
 
     keep_memory()
-    try:
-        differs = asked.against(environment())  # workers may have come later
-        if differs:
-            raise ClusterError(_other_versions(f"worker {_own_address()}", differs))
-        if getattr(_held, "digest", "") != digest:
-            _held.shared, _held.digest = pickle.loads(blob), digest
-        with threadpool_limits(limits=threads):
-            return "done", function(_held.shared, task, lambda word: None)
-    except Exception as error:  # all of them are raised by the caller
-        return "failed", able_to_travel(error)
+    try:  # workers may have come later
+        _check_versions(f"worker {get_worker().address}", versions, environment())
+    except ClusterError as error:
+        return "failed", error
+    with threadpool_limits(limits=threads):
+        return outcome(key, shared, job, lambda word: None)
 
 
-def _own_address() -> str:
-    from distributed import get_worker
-
-    return str(get_worker().address)
-
-
-def _other_versions(worker: str, differs: str) -> str:
-    return (
-        f"--scheduler: {worker} has other versions, so its results would differ ({differs}). "
-        "Install the same on all machines."
+def _check_versions(worker: str, here: dict[str, str], there: dict[str, str]) -> None:
+    differs = ", ".join(
+        f"{name} {version} here, {there.get(name, 'none')} there"
+        for name, version in here.items()
+        if version != there.get(name)
     )
+    if differs:
+        raise ClusterError(
+            f"--scheduler: {worker} has other versions, so its results would differ ({differs}). "
+            "Install the same on all machines."
+        )
 
 
 def _no_scheduler(address: str, error: Exception) -> str:

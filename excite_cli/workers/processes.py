@@ -1,137 +1,104 @@
 """Worker processes on this machine; one that dies is replaced and its task done again.
 
-`concurrent.futures` has a pool too, but there the death of one process is the end of all. Here
-every worker has a socket of its own, so a death concerns the task that it was doing, nothing else.
+Each task under way has a thread of a `ThreadPoolExecutor`, which gives it to an idle process and
+waits for the answer. Every process has a socket of its own, so a death concerns the task that it
+was doing, nothing else; in the pools of `concurrent.futures` and loky it is the end of all.
 """
 
-import contextlib
 import json
 import os
 import socket
 import subprocess
 import sys
-from collections import deque
-from collections.abc import Iterable, Iterator, Sequence, Sized
-from dataclasses import dataclass, field
-from multiprocessing.connection import Connection, wait
+from collections.abc import Iterator
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from hashlib import sha256
+from multiprocessing.connection import Connection
+from threading import Lock
 from typing import Any
+
+import numpy as np
 
 from excite_cli.out_of_core import Spool
 from excite_cli.workers.base import (
-    LOSSES,
     POSSIBLE,
+    Answer,
     Function,
+    Give,
     LostWorkersError,
-    News,
-    Watch,
+    NoWorkersError,
+    Tell,
     Workers,
     packed,
-    unwatched,
 )
+from excite_cli.workers.worker_main import share_heap
 
 # The parent's path of imports comes first, so that a checkout finds itself; until it is set, `-P`
 # keeps the current folder out: a json.py that lies there is no part of us.
 _BOOT = (
-    "import json, sys; sys.path[:] = json.loads(sys.argv[3]); "
+    "import json, sys; sys.path[:] = json.loads(sys.argv[2]); "
     "from excite_cli.workers.worker_main import serve; "
-    "serve(int(sys.argv[1]), int(sys.argv[2]), json.loads(sys.argv[4]))"
+    "serve(int(sys.argv[1]), json.loads(sys.argv[3]))"
 )
 _OURS, _NOT_NEEDED = "excite_cli.", "excite_cli.cli."
 _THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-_PATIENCE = 1.0  # [s] that a worker has to end
+LOSSES = 3  # times that a task may take its worker with it before it is given up
 
 
-class _Worker:
-    """One process with the socket to it; `task` is what it does, `knows` what it was sent."""
+class _Process:
+    """A process of ours and the socket to it."""
 
     def __init__(self, threads: int) -> None:
         ours, theirs = socket.socketpair()
+        # What we have imported may be needed for tasks: it is imported before they come.
+        modules = [each for each in list(sys.modules) if each.startswith(_OURS)]
+        modules = [each for each in modules if not each.startswith(_NOT_NEEDED)]
         with ours, theirs:
-            descriptor, path = theirs.fileno(), json.dumps(sys.path)
-            modules = json.dumps([name for name in sys.modules if _of_tasks(name)])
-            self.process = subprocess.Popen(
-                [sys.executable, "-P", "-c", _BOOT, str(descriptor), str(threads), path, modules],
+            descriptor = theirs.fileno()
+            arguments = (str(descriptor), json.dumps(sys.path), json.dumps(modules))
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-c", _BOOT, *arguments],
                 pass_fds=[descriptor],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,  # stdout is the answer of the command
                 env={**os.environ, **dict.fromkeys(_THREAD_VARIABLES, str(threads))},
                 process_group=0,  # Ctrl-C is for the parent
             )
-            self.connection = Connection(ours.detach())
+            self._connection = Connection(ours.detach())
+        self.pid, self.kill = self._process.pid, self._process.kill
         self.ready = False
-        self.knows: bytes | None = None
-        self.task: int | None = None
 
-    def end(self) -> int | None:
-        """Close the socket, which ends the process; its exit status."""
-        with contextlib.suppress(OSError):
-            self.connection.close()
-        try:
-            return self.process.wait(_PATIENCE)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            return self.process.wait()
+    def answer(self, job: bytes, tell: Tell) -> Answer:
+        """What becomes of a task; `OSError` or `EOFError` if the process ends before."""
+        self._connection.send_bytes(job)
+        while True:
+            kind, value = self._connection.recv()
+            if kind == "ready":
+                self.ready = True
+            elif kind == "told":
+                tell(value)
+            else:
+                return kind, value
 
-
-@dataclass
-class _Round:
-    """The state of one `map`."""
-
-    function: Function
-    shared: bytes
-    source: Iterator[Any]
-    total: int | None
-    watch: Watch
-    keep_failures: bool
-    spool: Spool
-    tasks: list[Any] = field(default_factory=list)
-    waiting: deque[int] = field(default_factory=deque)
-    results: dict[int, Any] = field(default_factory=dict)
-    failures: dict[int, Exception] = field(default_factory=dict)
-    losses: dict[int, int] = field(default_factory=dict)
-    running: int = 0
-    ended: bool = False
-
-    def tell(self, index: int, word: Any = None, result: Any = None) -> None:
-        total = len(self.tasks) if self.total is None else self.total
-        self.watch(News(len(self.results), self.running, total, index, word, result))
-
-    def done(self, index: int, result: Any) -> None:
-        """Keep a result, and tell."""
-        self.results[index] = result
-        self.tell(index, result=result)
-
-    def fail(self, index: int, error: Exception) -> None:
-        """Tasks are handed out in order: what comes after a failure need not be begun."""
-        if self.keep_failures:
-            self.done(index, error)
-        else:
-            self.failures[index] = error
-            self.waiting = deque(each for each in self.waiting if each < index)
-            self.ended = True
-
-    def take(self) -> int | None:
-        """The next task, taken from the source when a worker is there to do it."""
-        if self.waiting:
-            return self.waiting.popleft()
-        if self.ended:
-            return None
-        try:
-            self.tasks.append(next(self.source))
-        except StopIteration:
-            self.ended = True
-            return None
-        self.ended = len(self.tasks) == self.total
-        return len(self.tasks) - 1
+    def end(self) -> str:
+        """Kill it, unless it has ended by itself; in words, how it ended."""
+        self.kill()
+        status = self._process.wait()
+        return f"killed by signal {-status}" if status < 0 else f"exit status {status}"
 
 
 class Processes(Workers):
     """`count` processes, each with `threads` threads of linear algebra; started when needed."""
 
+    reads_our_files = POSSIBLE
+
     def __init__(self, count: int, threads: int = 1) -> None:
         self._count, self._threads = count, threads
-        self._workers: list[_Worker] = []
-        self._failed_starts = 0
+        self._all: set[_Process] = set()
+        self._idle: list[_Process] = []
+        self._lock, self._closing = Lock(), False
+        share_heap()
 
     @property
     def count(self) -> int:
@@ -141,155 +108,69 @@ class Processes(Workers):
     @property
     def pids(self) -> tuple[int, ...]:
         """Process ids of the workers that are running."""
-        return tuple(worker.process.pid for worker in self._workers)
-
-    def map(
-        self,
-        function: Function,
-        shared: Any,
-        tasks: Iterable[Any],
-        watch: Watch = unwatched,
-        *,
-        keep_failures: bool = False,
-    ) -> list[Any]:
-        """As `Workers.map`; the next of `tasks` is taken when a worker is there to do it."""
-        total = len(tasks) if isinstance(tasks, Sized) else None
-        if total == 0:
-            return []
-        spool = Spool(0)
-        round_ = _Round(
-            function, packed(shared, spool), iter(tasks), total, watch, keep_failures, spool
-        )
-        try:
-            self._start(self._count if total is None else total)
-            for worker in list(self._workers):
-                self._hand_out(worker, round_)
-            while self._awaited(round_):
-                for connection in wait([worker.connection for worker in self._workers]):
-                    worker = next(w for w in self._workers if w.connection is connection)
-                    self._listen(worker, round_)
-        except BaseException:
-            self.close()  # tasks may be running that nobody waits for any more
-            raise
-        if round_.failures:
-            self._drop_running()
-            raise round_.failures[min(round_.failures)]
-        return [round_.results[index] for index in range(len(round_.tasks))]
-
-    @property
-    def reads_our_files(self) -> bool:
-        """Where the system has /proc."""
-        return POSSIBLE
+        return tuple(process.pid for process in self._all)
 
     def begin(self) -> None:
         """Start the processes."""
-        self._start(self._count)
-
-    def _start(self, needed: int) -> None:
-        while len(self._workers) < min(self._count, needed):
-            self._workers.append(_Worker(self._threads))
+        self._closing = False
+        self._idle = [self._taken() for _ in range(self._count)]
 
     def close(self) -> None:
         """End all processes."""
-        _end(self._workers)
-        self._workers = []
+        with self._lock:
+            self._closing, ending = True, self._all
+            self._all, self._idle = set(), []
+        for process in ending:
+            process.kill()  # all of them at once, then wait
+        for process in ending:
+            process.end()
 
-    def _awaited(self, round_: _Round) -> bool:
-        """Whether a task is open whose end matters: after a failure, only those before it do."""
-        if round_.waiting or not round_.ended:
-            return True
-        first = min(round_.failures, default=len(round_.tasks))
-        return any(worker.task is not None and worker.task < first for worker in self._workers)
+    @contextmanager
+    def _round(self, function: Function, shared: Any) -> Iterator[Give]:
+        spool, self._closing = Spool(0), False
+        blob = packed(shared, spool)
+        key, common = sha256(blob).hexdigest(), spool.keep(np.frombuffer(blob, np.uint8))
 
-    def _drop_running(self) -> None:
-        """End the processes that are at work; the idle ones stay."""
-        _end([worker for worker in self._workers if worker.task is not None])
-        self._workers = [worker for worker in self._workers if worker.task is None]
+        def give(task: Any, tell: Tell) -> Future[Answer]:
+            job = packed((key, common, packed((function, task), spool)))
+            return threads.submit(self._done, job, tell)
 
-    def _hand_out(self, worker: _Worker, round_: _Round) -> None:
-        """Send the next task to a worker that is ready and idle."""
-        if not worker.ready or worker.task is not None or (index := round_.take()) is None:
-            return
-        worker.task = index
-        round_.running += 1
-        body = packed((round_.function, round_.tasks[index]), round_.spool)
-        try:
-            if worker.knows != round_.shared:
-                worker.connection.send(("shared", round_.shared))
-                worker.knows = round_.shared
-            worker.connection.send(("task", body))
-        except OSError:
-            self._replace(worker, round_)
+        with ThreadPoolExecutor(self._count) as threads:
+            try:
+                yield give
+            except BaseException:
+                self.close()  # tasks may be running whose results are of no use any more
+                raise
 
-    def _listen(self, worker: _Worker, round_: _Round) -> None:
-        """Take one message of a worker, or notice that it is gone."""
-        try:
-            kind, value = worker.connection.recv()
-        except (EOFError, OSError):
-            self._replace(worker, round_)
-            return
-        if kind == "ready":
-            worker.ready, self._failed_starts = True, 0
-        else:
-            assert worker.task is not None
-            index = worker.task
-            if kind == "told":
-                round_.tell(index, word=value)
-                return
-            worker.task = None
-            round_.running -= 1
-            if kind == "failed":
-                round_.fail(index, value)
-            else:
-                round_.done(index, value)
-        self._hand_out(worker, round_)
+    def _done(self, job: bytes, tell: Tell) -> Answer:
+        """In a thread: have it done by an idle process, or by another one if that dies."""
+        for _ in range(LOSSES):
+            process = self._taken()
+            try:
+                answer = process.answer(job, tell)
+            except (EOFError, OSError):
+                how = process.end()
+                self._all.discard(process)
+                continue
+            self._idle.append(process)
+            return answer
+        if process.ready:
+            raise LostWorkersError(
+                f"{LOSSES} times its worker ended while doing it ({how}). Often memory is short: "
+                "take fewer --workers."
+            )
+        raise NoWorkersError(
+            f"Workers cannot be started: {LOSSES} ended at once ({how}). Run without --workers, or "
+            "take fewer."
+        )
 
-    def _replace(self, worker: _Worker, round_: _Round) -> None:
-        """A new worker for one that died; its task comes next.
-
-        Raises
-        ------
-        LostWorkersError
-            Workers cannot be started.
-        """
-        status = worker.end()
-        if worker.task is not None:
-            index = worker.task
-            round_.running -= 1
-            round_.losses[index] = round_.losses.get(index, 0) + 1
-            if round_.losses[index] >= LOSSES:
-                lost = LostWorkersError(
-                    f"Task {index + 1} of {len(round_.tasks)} was given up: {LOSSES} times its "
-                    f"worker ended while doing it ({_words(status)}). Often memory is short: take "
-                    "fewer --workers."
-                )
-                round_.fail(index, lost)
-            elif not any(failed < index for failed in round_.failures):
-                round_.waiting.appendleft(index)
-        elif not worker.ready:
-            self._failed_starts += 1
-            if self._failed_starts >= LOSSES:
-                raise LostWorkersError(
-                    f"Workers cannot be started: {LOSSES} ended at once ({_words(status)}). Run "
-                    "without --workers, or take fewer."
-                )
-        self._workers[self._workers.index(worker)] = _Worker(self._threads)
-
-
-def _of_tasks(module: str) -> bool:
-    """Whether a module may be needed for tasks, so that a worker imports it before they come."""
-    return module.startswith(_OURS) and not module.startswith(_NOT_NEEDED)
-
-
-def _end(workers: Sequence[_Worker]) -> None:
-    for worker in workers:
-        with contextlib.suppress(OSError):
-            worker.connection.close()  # all of them at once, then wait
-    for worker in workers:
-        worker.end()
-
-
-def _words(status: int | None) -> str:
-    if status is not None and status < 0:
-        return f"killed by signal {-status}"
-    return f"exit status {status}"
+    def _taken(self) -> _Process:
+        """An idle process, else a new one."""
+        with self._lock:
+            if self._closing:
+                raise CancelledError
+            if self._idle:
+                return self._idle.pop()
+            process = _Process(self._threads)
+            self._all.add(process)
+            return process

@@ -2,7 +2,6 @@
 
 import os
 import signal
-from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -11,7 +10,6 @@ import pytest
 
 import excite_cli.out_of_core
 from excite_cli import diagnose, identify, load_data
-from excite_cli.workers.base import Function, Watch, Workers, unwatched
 from excite_cli.workers.processes import Processes
 from tests.api.conftest import Loop
 
@@ -30,33 +28,17 @@ def same(one: Any, other: Any) -> bool:
     return one is other or one == other or one != one
 
 
-class Deadly(Workers):
-    """Two processes, one of which is killed in the middle of the second round of tasks."""
+class Deadly(Processes):
+    """Two processes, one of which is killed before the second round of tasks."""
 
-    def __init__(self) -> None:
-        self.place, self.rounds, self.killed = Processes(2), 0, 0
+    rounds, killed = 0, False
 
-    @property
-    def count(self) -> int:
-        return 2
-
-    def map(
-        self,
-        function: Function,
-        shared: Any,
-        tasks: Sequence[Any],
-        watch: Watch = unwatched,
-        *,
-        keep_failures: bool = False,
-    ) -> list[Any]:
+    def map(self, *arguments: Any, **options: Any) -> list[Any]:
         self.rounds += 1
         if self.rounds == 2:
-            self.killed = self.place.pids[0]
-            os.kill(self.killed, signal.SIGKILL)
-        return self.place.map(function, shared, tasks, watch, keep_failures=keep_failures)
-
-    def close(self) -> None:
-        self.place.close()
+            os.kill(self.pids[0], signal.SIGKILL)
+            self.killed = True
+        return super().map(*arguments, **options)
 
 
 @pytest.mark.parametrize("task", [identify, diagnose])
@@ -64,7 +46,7 @@ def test_the_same_on_disk_and_on_two_processes_of_which_one_dies(
     task: Any, loop: Loop, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     alone = task(loop.problem, load_data(loop.problem, loop.data))
-    with Deadly() as workers:
+    with Deadly(2) as workers:
         shared = task(loop.problem, loop.data, workers=workers)
         assert workers.killed
         assert workers.rounds > 5

@@ -1,15 +1,12 @@
-"""Programs that do not want to end, stopped in every way: nothing of them runs on.
-
-`python -m benchmarks.trust.stubborn` does the same through the command line with the real 10 s.
-"""
+"""Programs that do not want to end, stopped in every way: nothing of them runs on."""
 
 import signal
 from pathlib import Path
 
 import pytest
 
-from benchmarks.trust.stubborn_programs import KINDS, alive, command_of, noted
 from tests.campaign.campaign_process import PATIENCE, program, said, start, until
+from tests.campaign.stubborn_programs import KINDS, alive, command_of, noted
 
 LONG = 600.0  # s: with this grace, nothing but a second signal ends them in time
 pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")

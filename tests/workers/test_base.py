@@ -6,10 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from excite_cli.kernels import compiled as kernels
 from excite_cli.out_of_core import Spool, attached, forget, reference_to
 from excite_cli.workers.base import POSSIBLE, packed
-from excite_cli.workers.cluster import environment
 from excite_cli.workers.processes import Processes
 from tests.workers import work
 
@@ -64,11 +62,3 @@ def test_a_file_that_is_gone_is_an_error(tmp_path: Path) -> None:
     assert reference is not None
     with pytest.raises(FileNotFoundError):
         attached(reference)
-
-
-def test_workers_without_the_compiled_loops_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kernels, "KERNELS", object())
-    here = environment.__wrapped__()
-    monkeypatch.setattr(kernels, "KERNELS", None)
-    assert here.against(here) == ""
-    assert here.against(environment.__wrapped__()) == "kernels compiled here, numpy there"

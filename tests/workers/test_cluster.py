@@ -8,8 +8,9 @@ import pytest
 
 from excite_cli import identify, load_problem, plan, simulate
 from excite_cli.errors import ConfigError, MissingExtraError, NoAdmissibleMotionError
+from excite_cli.kernels import compiled as kernels
 from excite_cli.workers.base import News
-from excite_cli.workers.cluster import Cluster, ClusterError, Environment, environment
+from excite_cli.workers.cluster import Cluster, ClusterError, environment
 from tests.api.conftest import SMOKE
 from tests.api.test_same_answers import same
 from tests.workers import work
@@ -51,24 +52,19 @@ def test_a_lost_worker_costs_its_task_a_second_try(cluster: Cluster, tmp_path: P
     assert cluster.map(work.dies_once, str(tmp_path), [2]) == [4]
 
 
-def test_a_worker_with_other_versions_is_refused(
+def test_a_worker_with_other_versions_is_refused_and_one_that_rounds_otherwise_is_named(
     scheduler: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    here = environment()
-    other = Environment((("Python", "2.7"), *here.versions[1:]), here.rounding)
-    monkeypatch.setattr("excite_cli.workers.cluster.environment", lambda: other)
-    with pytest.raises(ClusterError, match=r"other versions.*Python 2\.7 here, 3"):
-        Cluster(scheduler.scheduler_address)  # type: ignore[attr-defined]
-
-
-def test_one_that_rounds_otherwise_is_told(
-    scheduler: object, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    other = Environment(environment().versions, "something else")
-    monkeypatch.setattr("excite_cli.workers.cluster.environment", lambda: other)
+    address = scheduler.scheduler_address  # type: ignore[attr-defined]
     warnings: list[str] = []
-    Cluster(scheduler.scheduler_address, warn=warnings.append).close()  # type: ignore[attr-defined]
+    monkeypatch.setattr("excite_cli.workers.cluster.rounding", lambda: "something else")
+    Cluster(address, warn=warnings.append).close()
     assert "rounds in another way" in warnings[0]
+    monkeypatch.setattr(kernels, "KERNELS", None)
+    others = {**environment.__wrapped__(), "Python": "2.7"}
+    monkeypatch.setattr("excite_cli.workers.cluster.environment", lambda: others)
+    with pytest.raises(ClusterError, match=r"other versions.*Python 2\.7 here, 3.*kernels numpy"):
+        Cluster(address)
 
 
 def test_no_scheduler_is_said_at_once(monkeypatch: pytest.MonkeyPatch) -> None:

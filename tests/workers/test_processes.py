@@ -1,22 +1,22 @@
-"""Tasks in processes: order, errors, deaths, what reaches a worker, what is left behind."""
+"""Tasks here and in processes: order, errors, deaths, what reaches a worker, what is left."""
 
 import os
-import signal
+import select
 import subprocess
 import sys
-import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from excite_cli.errors import ConfigError, NoAdmissibleMotionError
-from excite_cli.workers.base import LostWorkersError, News, Workers
+from excite_cli.workers.base import LostWorkersError, News, NoWorkersError, Workers
 from excite_cli.workers.catalogue import open_workers
 from excite_cli.workers.here import Here
 from excite_cli.workers.processes import Processes
 from tests.workers import work
+
+HANGS = 120.0  # s
 
 
 @pytest.fixture(scope="module")
@@ -30,55 +30,14 @@ def workers(request: pytest.FixtureRequest, two: Processes) -> Workers:
     return Here() if request.param == "here" else two
 
 
-def alive(pid: int) -> bool:
-    """Whether the process runs; one that ended and was not waited for does not."""
-    try:
-        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
-    except OSError:
-        return False
-    return state not in "ZX"
+def test_results_come_in_the_order_of_the_tasks(two: Processes, tmp_path: Path) -> None:
+    assert two.map(work.after_the_next, str(tmp_path), [0, 1, 2, 3]) == [0, 1, 2, 3]
 
 
-def gone(pid: int, within: float = 5.0) -> bool:
-    end = time.monotonic() + within
-    while alive(pid) and time.monotonic() < end:
-        time.sleep(0.02)
-    return not alive(pid)
-
-
-def test_results_come_in_the_order_of_the_tasks(workers: Workers) -> None:
-    assert workers.map(work.later_first, 0.2, [0, 1, 2, 3]) == [0, 1, 2, 3]
-    assert workers.map(work.square, 10, [3, 4]) == [19, 26]
+def test_everything_is_heard(workers: Workers) -> None:
+    heard: list[News] = []
     assert workers.map(work.square, 10, []) == []
-
-
-def test_tasks_are_taken_when_somebody_is_there_to_do_them(two: Processes) -> None:
-    heard: list[News] = []
-    ahead: list[int] = []
-
-    def tasks() -> Iterator[int]:
-        for task in range(6):
-            ahead.append(task - sum(news.result is not None for news in heard))
-            yield task
-
-    assert two.map(work.square, 0, tasks(), heard.append) == [0, 1, 4, 9, 16, 25]
-    assert max(ahead) <= 2
-    assert two.map(work.square, 0, iter(())) == []
-
-
-def test_what_the_source_of_tasks_raises_is_raised(two: Processes) -> None:
-    def tasks() -> Iterator[int]:
-        yield 1
-        raise ConfigError("no second task")
-
-    with pytest.raises(ConfigError, match="no second task"):
-        two.map(work.square, 0, tasks())
-    assert two.map(work.square, 0, [2, 3]) == [4, 9]
-
-
-def test_everything_is_told(workers: Workers) -> None:
-    heard: list[News] = []
-    workers.map(work.square, 0, [5, 6, 7], heard.append)
+    assert workers.map(work.square, 0, [5, 6, 7], heard.append) == [25, 36, 49]
     ends = [news for news in heard if news.result is not None]
     assert sorted((news.index, news.result) for news in ends) == [(0, 25), (1, 36), (2, 49)]
     assert [news.done for news in ends] == [1, 2, 3]
@@ -86,20 +45,38 @@ def test_everything_is_told(workers: Workers) -> None:
     assert ("at 5", 0) in {(news.word, news.index) for news in heard}
 
 
-def test_the_first_failure_is_raised_whoever_was_ready_first(workers: Workers) -> None:
+def test_tasks_are_taken_when_somebody_is_there_to_do_them(workers: Workers) -> None:
+    heard: list[News] = []
+    ahead: list[int] = []
+
+    def tasks() -> Iterator[int]:
+        for task in range(6):
+            ahead.append(task - sum(news.result is not None for news in heard))
+            yield task
+        if workers.count == 1:
+            raise ConfigError("no seventh task")
+
+    if workers.count == 1:
+        with pytest.raises(ConfigError, match="no seventh task"):
+            workers.map(work.square, 0, tasks(), heard.append)
+    else:
+        assert workers.map(work.square, 0, tasks(), heard.append) == [0, 1, 4, 9, 16, 25]
+    assert max(ahead) < workers.count
+    assert workers.map(work.square, 0, iter(())) == []
+
+
+def test_the_first_failure_is_raised_or_all_are_kept(workers: Workers) -> None:
     with pytest.raises(ConfigError, match="task 1 is wrong"):
         workers.map(work.fails, 1, [0, 1, 2, 3])
     first, second, third = workers.map(work.fails, 1, [0, 1, 2], keep_failures=True)
     assert first == 0
     assert isinstance(second, ConfigError)
-    assert str(third) == "a later one, sooner"
+    assert str(third) == "task 2 is wrong"
 
 
-def test_after_a_failure_nobody_waits_for_later_tasks(two: Processes) -> None:
-    began = time.monotonic()
+def test_after_a_failure_nobody_waits_for_later_tasks(two: Processes, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="the first is wrong"):
-        two.map(work.fails_beside_a_long_one, 0, [0, 1, 2])
-    assert time.monotonic() - began < 30.0
+        two.map(work.after_the_next, str(tmp_path), [10, 11])
     assert two.map(work.square, 0, [2, 3, 4]) == [4, 9, 16]
 
 
@@ -122,73 +99,58 @@ def test_errors_travel_as_the_nearest_that_can(two: Processes) -> None:
     with pytest.raises(KeyError) as caught:
         two.map(work.bug, 0, [1])
     assert "work.py" in "".join(caught.value.__notes__), "the place of a bug is lost"
+    with pytest.raises(Exception, match="lambda"):
+        two.map(work.unpicklable, 0, [1])
 
 
 def test_a_worker_that_dies_costs_its_task_a_second_try(two: Processes, tmp_path: Path) -> None:
     assert two.map(work.dies_once, str(tmp_path), [2, 3, 4, 5]) == [4, 9, 16, 25]
-    assert len(two.pids) == 2
+    good, lost = two.map(work.always_dies_at, 1, [0, 1], keep_failures=True)
+    assert good == 0
+    with pytest.raises(LostWorkersError, match=r"Task 2 of 2 was given up: 3 times .*signal 9"):
+        raise lost
 
 
-def test_a_task_that_kills_every_worker_is_given_up(two: Processes) -> None:
-    with pytest.raises(LostWorkersError, match=r"Task 1 of 1 was given up: 3 times .*signal 9"):
-        two.map(work.always_dies, 0, [1])
-    assert two.map(work.square, 0, [2]) == [4]
-
-
-def test_one_killed_from_outside_changes_nothing(two: Processes, tmp_path: Path) -> None:
-    """One that has said that it began; another one does its task, a new or the surviving one."""
-    killed: list[int] = []
-
-    def kill() -> None:
-        while not (begun := list(tmp_path.glob("*.begun"))):
-            time.sleep(0.01)
-        killed.append(int(begun[0].stem))
-        os.kill(killed[0], signal.SIGKILL)
-        (tmp_path / "go").touch()
-
-    killer = threading.Thread(target=kill)
-    killer.start()
-    seen = two.map(work.begun, str(tmp_path), [1, 2, 3])
-    killer.join()
-    assert len(seen) == 3
-    assert killed[0] not in {*seen, *two.pids}
-    assert len(two.pids) == 2
+def test_workers_that_cannot_be_started_end_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("excite_cli.workers.processes._BOOT", "raise SystemExit(3)")
+    with Processes(2) as workers, pytest.raises(NoWorkersError, match=r"at once .exit status 3"):
+        workers.map(work.square, 0, [1], keep_failures=True)
 
 
 def test_an_interrupt_leaves_nothing_behind() -> None:
-    heard: list[int] = []
+    ends: list[int] = []
 
     def interrupted(news: News) -> None:
-        heard.extend(workers.pids)
+        ends.extend(os.pidfd_open(pid) for pid in workers.pids)
         raise KeyboardInterrupt
 
     with Processes(2) as workers, pytest.raises(KeyboardInterrupt):
-        workers.map(work.later_first, 5.0, [0, 20, 0], interrupted)
-    assert heard
-    assert all(gone(pid) for pid in heard)
+        workers.map(work.forever, None, [0, 1], interrupted)
+    assert ends
+    assert select.select(ends, [], [], 0)[0] == ends
 
 
-def test_workers_end_when_their_parent_is_killed(tmp_path: Path) -> None:
+def test_workers_end_when_their_parent_is_killed() -> None:
     script = """
 from excite_cli.workers.processes import Processes
 from tests.workers import work
 workers = Processes(2)
 workers.map(work.square, 0, [1, 2])
-print(*workers.pids, flush=True)
-workers.map(work.later_first, 60.0, [0, 0])
+workers.begin()
+workers.map(work.forever, 0, [0, 0], lambda news: print(*workers.pids, flush=True))
 """
     root = Path(__file__).parents[2]
     parent = subprocess.Popen(
         [sys.executable, "-c", script], cwd=root, stdout=subprocess.PIPE, text=True
     )
     assert parent.stdout is not None
-    pids = [int(word) for word in parent.stdout.readline().split()]
-    assert len(pids) == 2
-    assert all(alive(pid) for pid in pids)
-    time.sleep(0.3)  # they are at work now
+    ends = [os.pidfd_open(int(word)) for word in parent.stdout.readline().split()]
+    assert len(ends) == 2
     parent.kill()
     parent.communicate()
-    assert all(gone(pid) for pid in pids)
+    for end in ends:
+        assert select.select([end], [], [], HANGS)[0], "it outlives its parent"
+        os.close(end)
 
 
 def test_what_is_asked_for_decides_where() -> None:

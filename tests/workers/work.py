@@ -28,26 +28,10 @@ def square(shared: int, task: int, tell: Tell) -> int:
     return shared + task**2
 
 
-def later_first(shared: float, task: int, tell: Tell) -> int:
-    """The first tasks take longest."""
-    time.sleep(shared / (1 + task))
-    return task
-
-
-def fails(shared: Any, task: int, tell: Tell) -> int:
-    if task == shared:
-        time.sleep(0.2)
+def fails(shared: int, task: int, tell: Tell) -> int:
+    if task >= shared:
         raise ConfigError(f"task {task} is wrong")
-    if task > shared:
-        raise ConfigError("a later one, sooner")
     return task
-
-
-def fails_beside_a_long_one(shared: Any, task: int, tell: Tell) -> int:
-    if task:
-        time.sleep(60.0)
-    time.sleep(0.2)
-    raise ConfigError("the first is wrong")
 
 
 def long_winded(shared: Any, task: int, tell: Tell) -> int:
@@ -56,6 +40,26 @@ def long_winded(shared: Any, task: int, tell: Tell) -> int:
 
 def bug(shared: Any, task: int, tell: Tell) -> int:
     return {}["nothing"]
+
+
+def unpicklable(shared: Any, task: int, tell: Tell) -> Any:
+    return lambda: None
+
+
+def forever(shared: Any, task: int, tell: Tell) -> None:
+    tell("begun")
+    while True:
+        signal.pause()
+
+
+def after_the_next(folder: str, task: int, tell: Tell) -> int:
+    """Even tasks wait until the next one is done; 10 fails then, and 11 never ends."""
+    (Path(folder) / f"{task}").touch()
+    while task % 2 == 0 and not (Path(folder) / f"{task + 1}").exists():
+        time.sleep(0.01)
+    if task == 10:
+        raise ConfigError("the first is wrong")
+    return task if task != 11 else forever(None, task, tell)
 
 
 def dies_once(shared: str, task: int, tell: Tell) -> int:
@@ -67,17 +71,10 @@ def dies_once(shared: str, task: int, tell: Tell) -> int:
     return task**2
 
 
-def always_dies(shared: Any, task: int, tell: Tell) -> int:
-    os.kill(os.getpid(), signal.SIGKILL)
+def always_dies_at(shared: int, task: int, tell: Tell) -> int:
+    if task == shared:
+        os.kill(os.getpid(), signal.SIGKILL)
     return task
-
-
-def begun(folder: str, task: int, tell: Tell) -> int:
-    """The process that did it: it says that it has begun, and waits for the file `go`."""
-    (Path(folder) / f"{os.getpid()}.begun").touch()
-    while not (Path(folder) / "go").exists():
-        time.sleep(0.01)
-    return os.getpid()
 
 
 def search_path(shared: Any, task: Any, tell: Tell) -> list[str]:
