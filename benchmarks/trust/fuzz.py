@@ -19,13 +19,8 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
-from benchmarks.trust.data_files import (
-    BagFuzzer,
-    CsvFuzzer,
-    Hdf5Fuzzer,
-    MotionFuzzer,
-    ResultFuzzer,
-)
+from benchmarks.trust.bag_files import BagFuzzer
+from benchmarks.trust.data_files import CsvFuzzer, Hdf5Fuzzer, MotionFuzzer, ResultFuzzer
 from benchmarks.trust.robot_files import ConfigFuzzer, UrdfFuzzer
 from benchmarks.trust.trial import MOST_SECONDS, Fuzzer, Verdict, attempt, generator, protect
 

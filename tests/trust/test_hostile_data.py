@@ -14,7 +14,8 @@ import h5py
 import numpy as np
 import pytest
 
-from benchmarks.trust.data_files import JOINTS, BagFuzzer, recorded
+from benchmarks.trust.bag_files import BagFuzzer
+from benchmarks.trust.data_files import JOINTS, recorded
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import FileError
 from excite_cli.measurement import reader
