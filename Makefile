@@ -58,7 +58,6 @@ robots: $(STAMP)         ## robots of PyPI in four formats, init to diagnose, in
 bench: $(STAMP)          ## cost and gradient, growth, memory, whole motions, two workers
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.gradient
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.growth
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.memory
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.clearance
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.motions
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.scaling

@@ -5,11 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.peers.figaroh_races import BLIND, CLEAR, LIMITS, find
+from benchmarks.peers.motion_table import PART, Comparison, Entry, goals, markdown, placed
 from benchmarks.peers.our_driver import Clock, timed, with_columns
-from benchmarks.peers.our_races import OURS, OWN
-from benchmarks.peers.race import Measure, Race
-from benchmarks.peers.table import PART, Comparison, Entry, goals, markdown, placed
+from benchmarks.peers.races import BLIND, CLEAR, LIMITS, OURS, OWN, Measure, Race, find
 from benchmarks.problems import motion, problem
 from excite_cli.excitation.problem import Problem
 
