@@ -33,7 +33,6 @@ from benchmarks.peers.tools import (
     write_entries,
 )
 from benchmarks.program import ROOT
-from excite_cli.atomic import write_text_atomically
 
 DATA, DOCS = ROOT / "data", ROOT / "docs"
 STORED = DOCS / "scoreboard.json"
@@ -103,14 +102,9 @@ def entry(case: Case, arguments: argparse.Namespace) -> Entry:
 
 def publish(entries: list[Entry], readme: Path | None) -> None:
     """The page, the short table, and the README if it is given."""
-    pages = {DOCS / "scoreboard.md": page_part(entries, setting(entries))}
-    if readme is not None:
-        pages[readme] = short_table(entries)
-    for path, content in pages.items():
-        page = path.read_text(encoding="utf-8")
-        write_text_atomically(path, PART.replaced(page, content))
-    short = f"{PART.begin}\n{short_table(entries)}\n{PART.end}\n"
-    write_text_atomically(DOCS / "scoreboard_table.md", short)
+    PART.write(DOCS / "scoreboard.md", page_part(entries, setting(entries)))
+    for path in (DOCS / "scoreboard_table.md", *([] if readme is None else [readme])):
+        PART.write(path, short_table(entries))
 
 
 def setting(entries: list[Entry]) -> str:

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from benchmarks.peers import races
 from benchmarks.peers.motion_judge import CONTESTANTS, Judge, race_of_ours
-from benchmarks.peers.motion_table import Comparison, Entry, markdown, placed
+from benchmarks.peers.motion_table import PART, Comparison, Entry, dated_goals, markdown
 from benchmarks.peers.races import Measure, Race
 from benchmarks.problems import CONFIGS
 from excite_cli.atomic import write_text_atomically
@@ -49,8 +49,7 @@ def main() -> None:
     text = markdown(comparison)
     print(text)
     if arguments.goals is not None:
-        page = placed(arguments.goals.read_text(encoding="utf-8"), comparison)
-        write_text_atomically(arguments.goals, page)
+        PART.write(arguments.goals, dated_goals(comparison))
     if arguments.markdown is not None:
         write_text_atomically(arguments.markdown, text)
 

@@ -67,9 +67,9 @@ def markdown(comparison: Comparison) -> str:
 PART = MarkedPart("peers", "benchmarks.peers")
 
 
-def placed(page: str, comparison: Comparison) -> str:
-    """`page` with the dated goals between its two marks."""
-    return PART.replaced(page, f"Measured on {comparison.date}.\n\n{goals(comparison)}")
+def dated_goals(comparison: Comparison) -> str:
+    """What stands between the marks of a page."""
+    return f"Measured on {comparison.date}.\n\n{goals(comparison)}"
 
 
 def goals(comparison: Comparison) -> str:

@@ -12,15 +12,17 @@ import os
 import shutil
 import signal
 import tempfile
-import time
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict
 from multiprocessing import get_context
-from multiprocessing.connection import Connection, wait
 from pathlib import Path
+from typing import Any
 
 from benchmarks.trust.bag_files import BagFuzzer
-from benchmarks.trust.data_files import CsvFuzzer, Hdf5Fuzzer, MotionFuzzer, ResultFuzzer
+from benchmarks.trust.data_files import CsvFuzzer, MotionFuzzer
+from benchmarks.trust.hdf5_files import Hdf5Fuzzer, ResultFuzzer
 from benchmarks.trust.robot_files import ConfigFuzzer, UrdfFuzzer
 from benchmarks.trust.trial import MOST_SECONDS, Fuzzer, Verdict, attempt, generator, protect
 
@@ -33,26 +35,28 @@ FUZZERS: dict[str, type[Fuzzer]] = {
 _PATIENCE = 3 * MOST_SECONDS  # for what an alarm cannot interrupt
 
 
-def work(out: Connection, name: str, seed: int, bases: Path, numbers: range) -> None:
-    """In a worker: try inputs, and say of each that it begins and how it ended."""
+_at_work: dict[str, Any] = {}  # of a worker: its parser, a folder, the seed
+
+
+def _begin(name: str, seed: int, bases: Path) -> None:
+    """In a worker, once."""
     fuzzer = FUZZERS[name]()
     fuzzer.open(bases)
     protect()
     quiet = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):
         os.dup2(quiet, stream)  # libraries in C++ print there
-    with tempfile.TemporaryDirectory(prefix="fuzz_") as folder:
-        for number in numbers:
-            out.send(number)
-            out.send(_tried(fuzzer, seed, number, Path(folder)))
+    folder = Path(tempfile.mkdtemp(prefix="input_", dir=bases))
+    _at_work.update(fuzzer=fuzzer, seed=seed, folder=folder)
 
 
-def _tried(fuzzer: Fuzzer, seed: int, number: int, folder: Path) -> Verdict:
-    place = folder / "input"
+def _tried(number: int) -> Verdict:
+    """In a worker: one input, made and handed over."""
+    fuzzer, place = _at_work["fuzzer"], _at_work["folder"] / "input"
     place.mkdir()
     try:
         try:
-            path, made = fuzzer.make(generator(seed, fuzzer, number), place)
+            path, made = fuzzer.make(generator(_at_work["seed"], fuzzer, number), place)
         except Exception as error:  # ours, and to be mended before anything is believed
             return Verdict(number, "-", "not made", repr(error)[:300])
         return attempt(fuzzer, path, number, made)
@@ -60,65 +64,34 @@ def _tried(fuzzer: Fuzzer, seed: int, number: int, folder: Path) -> Verdict:
         shutil.rmtree(place, ignore_errors=True)
 
 
-class _Worker:
-    """A process that works off every n-th number; started again behind an input that ends it."""
-
-    def __init__(self, name: str, seed: int, bases: Path, numbers: range) -> None:
-        self.arguments = (name, seed, bases)
-        self.start(numbers)
-
-    def start(self, numbers: range) -> None:
-        """A new process for what is left."""
-        self.left, self.at, self.since = numbers, -1, time.monotonic()
-        processes = get_context("spawn")
-        self.pipe, theirs = processes.Pipe(duplex=False)
-        self.process = processes.Process(target=work, args=(theirs, *self.arguments, numbers))
-        self.process.start()
-        theirs.close()
-
-    def heard(self) -> Verdict | None:
-        """A verdict, if one has come; the process's own end is one where it died."""
-        self.since = time.monotonic()
-        try:
-            said = self.pipe.recv()
-        except EOFError:
-            return self._ended()
-        if isinstance(said, Verdict):
-            return said
-        self.at = said
-        return None
-
-    def _ended(self) -> Verdict | None:
-        self.process.join()
-        status, left = self.process.exitcode or 0, self.left
-        self.left = range(0)
-        if status == 0:
-            return None
-        if self.at < 0:
-            raise SystemExit(f"a worker of {self.arguments[0]} did not start (status {status})")
-        word = signal.Signals(-status).name if status < 0 else f"status {status}"
-        lost = Verdict(self.at, "-", word, "the process died")
-        if rest := range(self.at + left.step, left.stop, left.step):
-            self.start(rest)
-        return lost
-
-    def end_if_late(self) -> None:
-        """Kill it where it has not come back for too long."""
-        if self.at >= 0 and time.monotonic() - self.since > _PATIENCE:
-            self.process.kill()
-
-
-def run(name: str, count: int, seed: int, workers: int, bases: Path) -> Iterator[Verdict]:
+def run(name: str, count: int, seed: int, workers: int, bases: Path) -> list[Verdict]:
     """Try `count` inputs of a parser."""
     FUZZERS[name]().prepare(bases)
-    crew = [_Worker(name, seed, bases, range(k, count, workers)) for k in range(workers)]
-    while busy := [worker for worker in crew if worker.left]:
-        ready = wait([worker.pipe for worker in busy], timeout=1.0)
-        for worker in busy:
-            if worker.pipe not in ready:
-                worker.end_if_late()
-            elif (verdict := worker.heard()) is not None:
-                yield verdict
+    shares = [range(k, count, workers) for k in range(workers)]
+    with ThreadPoolExecutor(workers) as threads:
+        found = threads.map(lambda numbers: list(_by_one(name, seed, bases, numbers)), shares)
+        return [verdict for each in found for verdict in each]
+
+
+def _by_one(name: str, seed: int, bases: Path, numbers: range) -> Iterator[Verdict]:
+    """What one worker says; another one goes on behind an input that ends it or keeps it."""
+    worker: ProcessPoolExecutor | None = None
+    for number in numbers:
+        if worker is None:
+            own = (name, seed, bases)
+            worker = ProcessPoolExecutor(1, get_context("spawn"), _begin, own)
+            worker.submit(int).result()  # it has begun
+        (process,) = worker._processes.values()
+        try:
+            yield worker.submit(_tried, number).result(_PATIENCE)
+        except (BrokenProcessPool, TimeoutError):
+            process.kill()
+            process.join()
+            status, worker = process.exitcode or 0, None
+            word = signal.Signals(-status).name if status < 0 else f"status {status}"
+            yield Verdict(number, "-", word, "the process died")
+    if worker is not None:
+        worker.shutdown()
 
 
 def _replay(name: str, seed: int, number: int, bases: Path, keep: Path | None) -> None:
@@ -170,7 +143,7 @@ def main() -> int:
             return 0
         print("parser    inputs  accepted  refused  faults  seconds  cpu [s]  peak [MiB]")
         for name in FUZZERS if asked.parser == "all" else [asked.parser]:
-            found[name] = list(run(name, asked.count, asked.seed, asked.workers, Path(folder)))
+            found[name] = run(name, asked.count, asked.seed, asked.workers, Path(folder))
             faults += _tell(name, found[name])
     if asked.json is not None:
         data = {name: [asdict(each) for each in verdicts] for name, verdicts in found.items()}
