@@ -16,10 +16,8 @@ from benchmarks.trust.data_files import JOINTS, OfRecording, enter_data
 from benchmarks.trust.mutations import (
     Rng,
     chance,
-    odd_number,
     odd_samples,
     odd_text,
-    odd_value,
     pick,
     spoiled_bytes,
     spoiled_tree,
@@ -30,6 +28,7 @@ from excite_cli.api.report_figures import read_files
 from excite_cli.excitation.result import Result
 from excite_cli.measurement.dataset import Array
 from excite_cli.store.result_file import read_samples, write_result
+from tests.store.mutations import mutations
 
 
 class Hdf5Fuzzer(OfRecording):
@@ -47,7 +46,7 @@ class Hdf5Fuzzer(OfRecording):
         if way < 6:
             return path, "samples"
         if way < 11:
-            return path, _changed(rng, path, _restructured)
+            return path, _restructured(rng, path)
         path.write_bytes(spoiled_bytes(rng, path.read_bytes(), pick(rng, (1, 2, 5, 20))))
         return path, "bytes"
 
@@ -69,24 +68,21 @@ def _write(rng: Rng, path: Path, data: dict[str, Array]) -> None:
 
 
 _REFUSED = (ValueError, TypeError, OSError, RuntimeError, OverflowError, KeyError, MemoryError)
-Change = Callable[[Rng, Any, list[Any]], str]
 
 
-def _changed(rng: Rng, path: Path, change: Change) -> str:
-    """One or two parts of a file changed by `change`, which gets a list of all; in a word how."""
+def _restructured(rng: Rng, path: Path) -> str:
+    """One or two parts replaced by something odd; in a word by what."""
     made = "nothing"
     with h5py.File(path, "a") as file:
         for _ in range(int(rng.integers(1, 3))):
-            items: list[Any] = [file]
-            file.visititems(lambda _, item, items=items: items.append(item))
+            groups: list[Any] = [file]
+            file.visititems(
+                lambda _, item, g=groups: g.append(item) if isinstance(item, h5py.Group) else None
+            )
+            name = pick(rng, ("t", "q", "dq", "tau", "runs", "extra", odd_text(rng)))
             with contextlib.suppress(*_REFUSED):  # h5py itself refuses to write it
-                made = change(rng, file, items)
+                made = _replaced(rng, pick(rng, groups), name)
     return made
-
-
-def _restructured(rng: Rng, file: Any, items: list[Any]) -> str:
-    group = pick(rng, [item for item in items if isinstance(item, h5py.Group)])
-    return _replaced(rng, group, pick(rng, ("t", "q", "dq", "tau", "runs", "extra", odd_text(rng))))
 
 
 _BLOCK, _SIZES = (120, 3), (2**20, 2**24, 2**27, 2**31, 2**32 + 1, 10**12, 2**40, 2**62)
@@ -170,7 +166,6 @@ def _replaced(rng: Rng, group: Any, name: str) -> str:
 
 
 _CONFIG = Path(__file__).resolve().parents[2] / "configs" / "smoke.yaml"
-_KINDS = ("result", "fit", "diagnosis")
 
 
 class ResultFuzzer(Fuzzer):
@@ -192,18 +187,25 @@ class ResultFuzzer(Fuzzer):
         diagnose(problem, data, output=bases / "diagnosis.h5")
 
     def open(self, bases: Path) -> None:
-        """The files' bytes."""
-        self._data = {kind: (bases / f"{kind}.h5").read_bytes() for kind in _KINDS}
+        """The files, their bytes, and the ways to spoil one part of each."""
+        self._files = [bases / f"{kind}.h5" for kind in ("result", "fit", "diagnosis")]
+        self._data = {file: file.read_bytes() for file in self._files}
+        self._parts = {file: list(mutations(file)) for file in self._files}
 
     def make(self, rng: Rng, folder: Path) -> tuple[Path, str]:
         """A spoiled file."""
-        kind, path = pick(rng, _KINDS), folder / "stored.h5"
-        if chance(rng, 0.4):
-            data = spoiled_bytes(rng, self._data[kind], pick(rng, (1, 2, 5, 20)))
-            path.write_bytes(data)
-            return path, f"bytes of {kind}"
-        path.write_bytes(self._data[kind])
-        return path, f"{_changed(rng, path, _spoiled_record)} of {kind}"
+        base, path = pick(rng, self._files), folder / "stored.h5"
+        way = int(rng.integers(4))
+        if way == 0:
+            part = pick(rng, self._parts[base])
+            part.apply(base, path)
+            return path, f"{part.name} of {base.stem}"
+        spoil = way == 1
+        data = self._data[base]
+        path.write_bytes(data if spoil else spoiled_bytes(rng, data, pick(rng, (1, 2, 5, 20))))
+        if spoil:
+            _spoil_records(rng, path)
+        return path, f"{'records' if spoil else 'bytes'} of {base.stem}"
 
     def enter(self, path: Path) -> None:
         """As a report reads it; motions are sampled too."""
@@ -214,42 +216,25 @@ class ResultFuzzer(Fuzzer):
                 motion.trajectory.states(np.linspace(0, 1, 5), motion.coefficients)
 
 
-def _spoiled_record(rng: Rng, file: Any, items: list[Any]) -> str:
-    item = pick(rng, items)
-    if item.attrs and chance(rng, 0.5):
-        key = pick(rng, list(item.attrs))
-        value = _odd_attribute(rng, item.attrs[key])
-        if value is None:
-            del item.attrs[key]
-        else:
-            item.attrs[key] = value
-        return "attribute"
-    if isinstance(item, h5py.Group):
-        return _replaced(rng, item, pick(rng, list(item) or ["x"]))
-    if isinstance(item, h5py.Dataset) and item.nbytes <= 10**8:  # larger made so by an earlier one
-        _spoil_array(rng, item)
-    return "array"
+def _spoil_records(rng: Rng, path: Path) -> None:
+    """Values within one or two of the records, which are JSON."""
+    with h5py.File(path, "a") as file:
+        records: list[tuple[Any, str]] = []
+
+        def note(_: str, item: Any) -> None:
+            records.extend((item.attrs, key) for key in item.attrs)
+            records.append((item.parent, item.name.rsplit("/", 1)[1]))
+
+        file.visititems(note)
+        records.extend((file.attrs, key) for key in file.attrs)
+        texts = [(*each, _text(*each)) for each in records]
+        texts = [each for each in texts if each[2][:1] in ("{", "[")]
+        for holder, key, text in (pick(rng, texts) for _ in range(int(rng.integers(1, 3)))):
+            del holder[key]
+            holder[key] = json.dumps(spoiled_tree(rng, json.loads(text)))
 
 
-def _odd_attribute(rng: Rng, value: Any) -> Any:
-    if isinstance(value, str) and value[:1] in "{[" and chance(rng, 0.7):
-        return json.dumps(spoiled_tree(rng, json.loads(value)))
-    texts = (odd_text(rng), "[" * 100_000, '{"a": ' * 3000, "9" * 5000, json.dumps(odd_value(rng)))
-    others = (h5py.Empty("f8"), np.zeros(0), np.zeros((2, 2)), b"\xff", odd_number(rng), None)
-    return pick(rng, (*texts, *others))
-
-
-def _spoil_array(rng: Rng, item: Any) -> None:
-    parent, name, value = item.parent, item.name.rsplit("/", 1)[1], item[()]
-    if isinstance(value, bytes) and value[:1] in b"{[" and chance(rng, 0.8):
-        new: Any = json.dumps(spoiled_tree(rng, json.loads(value)))
-    elif np.size(value) and np.asarray(value).dtype.kind == "f" and chance(rng, 0.6):
-        new = np.array(value, dtype=float)
-        new.flat[int(rng.integers(new.size))] = float(odd_number(rng))
-        if new.ndim and chance(rng, 0.5):
-            new = pick(rng, (new[:-1], new.T, new[None], new.ravel(), new * np.nan))
-    else:
-        _replaced(rng, parent, name)
-        return
-    del parent[name]
-    parent[name] = new
+def _text(holder: Any, key: str) -> str:
+    value = holder[key]
+    value = value[()] if isinstance(value, h5py.Dataset) else value
+    return value.decode() if isinstance(value, bytes) else value if isinstance(value, str) else ""
