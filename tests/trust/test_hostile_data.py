@@ -194,3 +194,11 @@ def test_motion_archives(header: str, word: str, tmp_path: Path) -> None:
         for name in ("t", "q", "joint_names"):
             archive.writestr(f"{name}.npy", head + b"\0" * 100)
     assert word in refused(motion, path)
+
+
+def test_what_a_file_says_is_told_in_part(tmp_path: Path) -> None:
+    path = tmp_path / "motion.yaml"
+    path.write_text(f"joint_names: [a]\npoints: [{{positions: [1{'*a' * 40_000}]}}]\n")
+    message = refused(motion, path)
+    assert "motion.yaml" in message
+    assert len(message) < 1000
