@@ -416,9 +416,9 @@ def write(path: Path, seed: int, outcomes: Sequence[Outcome]) -> None:
     """Everything as JSON, whole after each case."""
     cases = [asdict(o) for o in sorted(outcomes, key=lambda o: o.index)]
     content = {"seed": seed, "cases": cases}
-    text = json.dumps(content, indent=1, ensure_ascii=False, default=_told)
+    text = json.dumps(content, indent=1, ensure_ascii=False, default=_plain)
     write_text_atomically(path, text)
 
 
-def _told(value: object) -> object:
+def _plain(value: object) -> object:
     return float(value) if isinstance(value, np.generic) else str(value)
