@@ -55,11 +55,9 @@ docs: $(STAMP)           ## the documentation, into site/; a warning is an error
 robots: $(STAMP)         ## robots of PyPI in four formats, init to diagnose, into docs/robots.md (hours)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.all_robots --sources robot-sources --workers 2 --resume
 
-bench: $(STAMP)          ## cost and gradient, growth, memory, whole motions, two workers
+bench: $(STAMP)          ## cost and gradient, growth, whole motions, memory, two workers
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.gradient
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.growth
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.memory
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.clearance
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.motions
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.scaling
 

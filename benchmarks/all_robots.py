@@ -2,7 +2,7 @@
 
 Per robot: `excite init`, `optimize`, `check`, `simulate` with an effect that the config does not
 declare, and `diagnose`. What came of it is kept as one JSON file per robot, so that a run can be
-interrupted and gone on with; the page docs/robots.md is made of all that are there.
+interrupted and gone on with; the figures of docs/robots.md are made of all that are there.
 
 Run: python -m benchmarks.all_robots --sources FOLDER [--only WORD …] [--workers 2] [--resume]
      python -m benchmarks.all_robots --sources FOLDER --page-only
@@ -18,7 +18,7 @@ from pathlib import Path
 
 from benchmarks.program import ROOT
 from benchmarks.robots.journey import travelled
-from benchmarks.robots.page import page
+from benchmarks.robots.page import PART, page
 from benchmarks.robots.sources import Source, fetch, sources
 
 PAGE = ROOT / "docs" / "robots.md"
@@ -58,7 +58,7 @@ def main() -> None:
             list(pool.map(travel, wanted))
     paths = [(each, records / f"{_file(each)}.json") for each in known]
     there = [(each, json.loads(path.read_text())) for each, path in paths if path.exists()]
-    PAGE.write_text(page(there, known, options.seed), encoding="utf-8")
+    PART.write(PAGE, page(there, known, options.seed))
 
 
 def _file(source: Source) -> str:

@@ -34,6 +34,7 @@ from excite_cli.excitation.random_baseline import random_baseline
 from excite_cli.excitation.result import Result
 from excite_cli.store.result_file import read_result, write_result
 
+PART = pages.MarkedPart("campaigns", "benchmarks.closed_loops")
 _TEST_SEED = 4711
 _TEST_MOTIONS = 2
 _FIRST = 3  # motions that are planned at least
@@ -59,36 +60,20 @@ class Loop:
 
 
 LOOPS = (
-    Loop(
-        "UR10",
-        "configs/ur10.yaml",
-        ("load_dependent_friction@elbow_joint=0.06", "spring@wrist_1_joint=4"),
-    ),
-    Loop(
-        "Panda",
-        "configs/panda.yaml",
-        ("ripple@panda_joint2=1.5,periods:20", "torque_offset@panda_joint4=0.8"),
-    ),
-    Loop(
-        "TALOS' arms",
-        "configs/talos_arms.yaml",
-        ("coulomb_friction@arm_left_4_joint=1.5", "spring@arm_right_2_joint=4"),
-        # As the message says where a posture has no way into a motion.
-        more=("--set", "trajectory.at_rest=true"),
-    ),
-    Loop(
-        "bench arm (MJCF)",
-        "data/bench_arm.xml",
-        ("stribeck_friction@shoulder=4", "spring@pitch=2"),
-    ),
-    Loop(
-        "standing TALOS",
-        "configs/talos_base.yaml",
-        ("base_tilt@all=0.01,pitch:0.0524", "coulomb_friction@arm_left_1_joint=2"),
-        more=("--set", "robot.rows=[base, joints]"),
-        by_motions=True,
-    ),
-)
+    Loop("UR10", "configs/ur10.yaml",
+         ("load_dependent_friction@elbow_joint=0.06", "spring@wrist_1_joint=4")),
+    Loop("Panda", "configs/panda.yaml",
+         ("ripple@panda_joint2=1.5,periods:20", "torque_offset@panda_joint4=0.8")),
+    # At rest, as the message says where a posture has no way into a motion.
+    Loop("TALOS' arms", "configs/talos_arms.yaml",
+         ("coulomb_friction@arm_left_4_joint=1.5", "spring@arm_right_2_joint=4"),
+         more=("--set", "trajectory.at_rest=true")),
+    Loop("bench arm (MJCF)", "data/bench_arm.xml",
+         ("stribeck_friction@shoulder=4", "spring@pitch=2")),
+    Loop("standing TALOS", "configs/talos_base.yaml",
+         ("base_tilt@all=0.01,pitch:0.0524", "coulomb_friction@arm_left_1_joint=2"),
+         more=("--set", "robot.rows=[base, joints]"), by_motions=True),
+)  # fmt: skip
 
 
 class Folder:
@@ -261,7 +246,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--only", nargs="+", help="robots whose name has one of these words")
     parser.add_argument("--folder", type=Path, default=Path("results/closed_loops"))
-    parser.add_argument("--page", type=Path, help="write the page here")
+    parser.add_argument("--page", type=Path, help="put the figures between its marks")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
     records = []
@@ -274,39 +259,10 @@ def main() -> None:
         if path.exists():
             records.append(json.loads(path.read_text()))
             print(table(records[-1:]), flush=True)
-    parts = (_OPENING, f"{date.today():%d %B %Y}.", table(records), "## Rounds", rounds(records))
-    text = "\n\n".join(parts) + "\n"
     if options.page is not None:
-        options.page.write_text(text, encoding="utf-8")
+        parts = (f"{date.today():%d %B %Y}.", table(records), "## Rounds", rounds(records))
+        PART.write(options.page, "\n\n".join(parts))
 
-
-_OPENING = """\
-# Campaigns on simulated robots
-
-`make loops` makes this page (two hours). The robots are simulated in MuJoCo with inertias 10 to
-30 % off their descriptions, 1 % of noise on the torques, and two or three effects that no config
-declares. One of the effects is a torque saturation. It acts only above the torques of the first
-round, which is played at 40 % of the motions' pace.
-
-- `campaign`: `excite campaign CONFIG --measure simulate`, unattended until it ends by itself.
-- `plain`: motions planned in one run, for the same motion time, at full pace, diagnosed once.
-- `random`: random admissible motions, the best of four times as many, otherwise as `plain`.
-
-Full pace from the beginning is unsafe on an unknown robot.
-
-*Held-out error* is the error of the predicted torque on two random motions that no model was
-fitted to, where joints move, mean over the joints. Noise alone gives about 0.2 %. For the wrench
-of the standing robot it gives 1 to 8 % of a row, since its motions are slow beside the 2 N and
-0.5 N·m of noise of its feet.
-
-Motions of the standing robot take minutes to plan. There `plain` and `random` have the same number
-of motions as the campaign, in fewer seconds.
-
-For the same motion time, motions at full pace give the same effects and equal or smaller errors,
-since most of a campaign's time is at low pace. A campaign has three other advantages. It plays no
-motion faster than the present knowledge allows, it detects effects that only later motions show,
-and it reports when to stop.
-"""
 
 if __name__ == "__main__":
     main()

@@ -27,7 +27,7 @@ from excite_cli.effects.catalogue import kind_named
 from excite_cli.identification.identify import identify
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.robot.model import Array
-from excite_cli.simulation.ground_truth import PlantedEffect, plant
+from excite_cli.simulation.ground_truth import plant
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 
@@ -82,22 +82,6 @@ def noisy(data: Dataset, made: Made, coarse: bool, rng: np.random.Generator) -> 
     return replace(data, runs=tuple(runs))
 
 
-def friction_of(joints: int, rng: np.random.Generator) -> list[PlantedEffect]:
-    """Viscous and Coulomb friction of every joint."""
-    return [
-        plant(kind_named(kind), (j,), float(rng.uniform(0.5, 5.0)))
-        for kind in FRICTION
-        for j in range(joints)
-    ]
-
-
-def payload_of(joint: int, mass: float, centre: Array, run: str) -> PlantedEffect:
-    """A sphere on the joint's link in one run."""
-    others = dict(zip(("cx", "cy", "cz"), map(float, centre), strict=True))
-    one = plant(kind_named("payload"), (joint,), float(mass), others)
-    return replace(one, effect=replace(one.effect, runs=(run,)))
-
-
 def scores(
     name: str, number: int, seed: int, trials: int, noise: str, inertias: Any
 ) -> tuple[list[str], Array]:
@@ -105,9 +89,15 @@ def scores(
     of, rng = arm(name), np.random.default_rng([seed, number, ROBOTS.index(name)])
     motions = four_motions(name, int(rng.integers(8)), rng)[:3]
     joints = of.robot.n
-    rubbing = friction_of(joints, rng)
-    centre = rng.uniform([-0.05, -0.05, 0.02], [0.05, 0.05, 0.12])
-    body = payload_of(joints - 1, float(rng.uniform(1.0, 3.0)), centre, LOADED)
+    rubbing = [
+        plant(kind_named(kind), (j,), float(rng.uniform(0.5, 5.0)))
+        for kind in FRICTION
+        for j in range(joints)
+    ]
+    centre = map(float, rng.uniform([-0.05, -0.05, 0.02], [0.05, 0.05, 0.12]))
+    others = dict(zip(("cx", "cy", "cz"), centre, strict=True))
+    body = plant(kind_named("payload"), (joints - 1,), float(rng.uniform(1.0, 3.0)), others)
+    body = replace(body, effect=replace(body.effect, runs=(LOADED,)))
     settings = SimulationSettings(
         seed=int(rng.integers(2**31)), rate=RATE, torque_noise=0.0, encoder=0.0,
         inertia_error=INERTIAS_OFF,

@@ -8,10 +8,8 @@ Run: python -m benchmarks.growth
 """
 
 import json
-import time
 import tracemalloc
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -34,38 +32,29 @@ REST = ["torso_1_joint", "torso_2_joint", "head_1_joint", "head_2_joint"]
 SETS = {7: ARMS[:7], 14: ARMS, 18: ARMS + REST, 30: ARMS + REST + LEGS}
 
 
-@dataclass(frozen=True)
-class Cost:
-    """Milliseconds of cost and gradient, of the bare calls, of an iteration; peak in MB."""
-
-    gradient: float
-    bare: float
-    iteration: float
-    memory: float
+# What grows: milliseconds of cost and gradient, and of one iteration; peak in MB.
+GROWING = ("gradient ms", "iteration ms", "memory MB")
 
 
-def measured(of: Problem, stacked: int = 0) -> Cost:
+def measured(of: Problem, stacked: int = 0) -> dict[str, float]:
+    """Those, and the ratio of cost and gradient to the bare calls."""
     alpha, stack = motion(of), Stack.empty(of.base.rank)
     for seed in range(stacked):
         stack = stack.with_rows(of.objective().block(motion(of, 100 + seed)))
     objective, bare = of.objective(stack), BareCalls(of, alpha)
+    task = MotionTask(of, stack)
+    x = random_start(task, base_motion(task, 1), (1, 1, 0))
     found = interleaved(
         {"bare": bare.run, "gradient": lambda: objective.value_and_gradient(alpha, of.criterion)},
         _REPEATS,
     )
-    task = MotionTask(of, stack)
-    x = random_start(task, base_motion(task, 1), (1, 1, 0))
-    _iterate(of, stack, x)
-    began = time.perf_counter()
-    _iterate(of, stack, x)
-    seconds = time.perf_counter() - began
+    found |= interleaved({"iteration": lambda: _iterate(of, stack, x)}, 1)
     tracemalloc.start()
     _iterate(of, stack, x)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    return Cost(
-        1e3 * found["gradient"], 1e3 * found["bare"], 1e3 * seconds / _ITERATIONS, peak / 1e6
-    )
+    grown = (1e3 * found["gradient"], 1e3 * found["iteration"] / _ITERATIONS, peak / 1e6)
+    return dict(zip(GROWING, grown, strict=True)) | {"/ bare": found["gradient"] / found["bare"]}
 
 
 def _iterate(of: Problem, stack: Stack, x: np.ndarray) -> None:
@@ -74,21 +63,16 @@ def _iterate(of: Problem, stack: Stack, x: np.ndarray) -> None:
 
 
 def family(name: str, cases: Sequence[tuple[int, Problem, int]]) -> None:
-    print(f"\n{name:>16} {'base par.':>10} {'gradient ms':>12} {'/ bare':>7} "
-          f"{'iteration ms':>13} {'memory MB':>10}")  # fmt: skip
-    sizes, costs = [], []
+    heads = (*GROWING, "/ bare")
+    print(f"\n{name:>16} {'base par.':>10} " + " ".join(f"{head:>13}" for head in heads))
+    costs = []
     for size, of, stacked in cases:
-        cost = measured(of, stacked)
-        sizes.append(size)
-        costs.append(cost)
-        print(f"{size:16} {of.base.rank:10} {cost.gradient:12.2f} {cost.gradient / cost.bare:7.2f} "
-              f"{cost.iteration:13.1f} {cost.memory:10.1f}", flush=True)  # fmt: skip
-    exponents = [
-        np.polyfit(np.log(sizes), np.log([getattr(cost, what) for cost in costs]), 1)[0]
-        for what in ("gradient", "iteration", "memory")
-    ]
-    print(f"{'exponent':>16} {'':10} {exponents[0]:12.2f} {'':7} {exponents[1]:13.2f} "
-          f"{exponents[2]:10.2f}")  # fmt: skip
+        costs.append(measured(of, stacked))
+        cells = " ".join(f"{costs[-1][head]:13.2f}" for head in heads)
+        print(f"{size:16} {of.base.rank:10} {cells}", flush=True)
+    sizes = np.log([size for size, _, _ in cases])
+    slopes = (np.polyfit(sizes, np.log([cost[what] for cost in costs]), 1)[0] for what in GROWING)
+    print(f"{'exponent':>16} {'':10} " + " ".join(f"{each:13.2f}" for each in slopes))
 
 
 def main() -> None:

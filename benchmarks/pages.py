@@ -3,6 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
+from pathlib import Path
+
+from excite_cli.atomic import write_text_atomically
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,11 @@ class MarkedPart:
         if not found:
             raise ValueError(f"the page lacks {self.begin} … {self.end}")
         return f"{before}{self.begin}\n{content}\n{self.end}{after}"
+
+    def write(self, path: Path, content: str) -> None:
+        """Put `content` between the two marks of a page."""
+        page = self.replaced(path.read_text(encoding="utf-8"), content)
+        write_text_atomically(path, page)
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[object]]) -> str:

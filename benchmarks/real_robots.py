@@ -17,7 +17,6 @@ from typing import Any
 from benchmarks import pages
 from benchmarks.pages import MarkedPart, percent
 from benchmarks.program import excite
-from excite_cli.atomic import write_text_atomically
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION
 
 DATA = Path(__file__).parents[1] / "data"
@@ -88,8 +87,7 @@ def main() -> None:
             rows.append(row(log, answers))
             print(" | ".join(rows[-1]), flush=True)
     if arguments.markdown is not None:
-        page = arguments.markdown.read_text(encoding="utf-8")
-        write_text_atomically(arguments.markdown, PART.replaced(page, table(rows)))
+        PART.write(arguments.markdown, table(rows))
 
 
 def diagnosed(log: Log, options: Sequence[str]) -> Answer:

@@ -20,7 +20,9 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -39,6 +41,7 @@ from excite_cli.workers.processes import Processes
 GOAL = 1.8
 BEYOND = (8, 32, 128)
 _NOTHINGS = 300
+_DASK_READY = 3.0  # s
 
 
 class Timed:
@@ -76,8 +79,12 @@ class Measured:
 
 def campaign(of: Problem, open_: Callable[[], Workers]) -> Measured:
     """From opening the workers to the finished motion."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    began = time.perf_counter()
+
+    def processor() -> float:
+        spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return spent.ru_utime + spent.ru_stime
+
+    before, began = processor(), time.perf_counter()
     with open_() as place:
         workers = Timed(place)
         result = continue_run(
@@ -88,19 +95,16 @@ def campaign(of: Problem, open_: Callable[[], Workers]) -> Measured:
             workers=workers,
         )
         seconds = time.perf_counter() - began
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    inside = workers.inside
-    return Measured(result, seconds, seconds - inside, tuple(workers.starts), processor)
+    serial = seconds - workers.inside
+    return Measured(result, seconds, serial, tuple(workers.starts), processor() - before)
 
 
 def identical(first: Result, second: Result) -> bool:
     """Whether all that is stored of the motions is the same to the last bit, except seconds."""
     pairs = zip(first.motions, second.motions, strict=True)
+    other = {"coefficients": 0, "seconds": 0}
     return np.array_equal(first.stack.factor, second.stack.factor) and all(
-        np.array_equal(a.coefficients, b.coefficients)
-        and {**vars(a), "coefficients": 0, "seconds": 0}
-        == {**vars(b), "coefficients": 0, "seconds": 0}
+        np.array_equal(a.coefficients, b.coefficients) and vars(a) | other == vars(b) | other
         for a, b in pairs
     )
 
@@ -133,34 +137,30 @@ def queue(starts: Sequence[float], workers: int) -> float:
     return max(free)
 
 
-class Killing(Processes):
-    """Two processes of which one is killed after a while."""
-
-    def __init__(self, after: float) -> None:
-        super().__init__(2)
-        self.killed = 0
-        timer = threading.Timer(after, self._kill)
-        timer.daemon = True
-        timer.start()
-
-    def _kill(self) -> None:
-        for pid in self.pids[:1]:
-            os.kill(pid, signal.SIGKILL)
-            self.killed = pid
+def killed_later(seconds: float, pid: Callable[[], int]) -> None:
+    """Kill a process after a while."""
+    timer = threading.Timer(seconds, lambda: os.kill(pid(), signal.SIGKILL))
+    timer.daemon = True
+    timer.start()
 
 
-def in_dask(of: Problem, kill_after: float | None = None) -> Measured:
+def two_of_which_one_is_killed(after: float) -> Workers:
+    workers = Processes(2)
+    killed_later(after, lambda: workers.pids[0])
+    return workers
+
+
+@contextmanager
+def dask(kill_after: float | None = None):
+    """Opens workers of a cluster of two, one of which is killed after a while."""
     from distributed import LocalCluster
 
     from excite_cli.workers.cluster import Cluster
 
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster:
         if kill_after is not None:
-            pid = next(iter(cluster.workers.values())).pid
-            timer = threading.Timer(kill_after, os.kill, (pid, signal.SIGKILL))
-            timer.daemon = True
-            timer.start()
-        return campaign(of, lambda: Cluster(cluster.scheduler_address, warn=print))
+            killed_later(kill_after, lambda: next(iter(cluster.workers.values())).pid)
+        yield lambda: Cluster(cluster.scheduler_address, warn=print)
 
 
 def main() -> None:
@@ -178,8 +178,7 @@ def main() -> None:
         asked.config,
         f"optimizer.restarts={asked.starts}",
         f"optimizer.max_iterations={asked.iterations}",
-        "optimizer.max_seconds=3600",
-        "sequence.motions=1",
+        *("optimizer.max_seconds=3600", "sequence.motions=1"),
     )
     print(
         f"{asked.config}, {of.variables} variables; one motion, {asked.starts} starts of at most "
@@ -192,14 +191,11 @@ def main() -> None:
         f"task costs {1e3 * each:.2f} ms more than its work"
     )
     one, two = _one_and_two(of, asked.repeats)
-    ratio = one.seconds / two.seconds
-    print(
-        f"one worker {one.seconds:.1f} s, two {two.seconds:.1f} s: {ratio:.2f} times as fast "
-        f"(goal {GOAL}); processor time of the workers {one.processor:.1f} and "
-        f"{two.processor:.1f} s"
-    )
     motion = one.result.motions[0]
     print(
+        f"one worker {one.seconds:.1f} s, two {two.seconds:.1f} s: "
+        f"{one.seconds / two.seconds:.2f} times as fast (goal {GOAL}); processor time of the "
+        f"workers {one.processor:.1f} and {two.processor:.1f} s\n"
         f"best of {asked.starts} starts: condition number {motion.condition_number:.4f}; starts "
         f"take {min(one.starts):.2f} to {max(one.starts):.2f} s, {np.mean(one.starts):.2f} s on "
         f"average; {one.serial:.2f} s outside them"
@@ -207,48 +203,35 @@ def main() -> None:
     _identical("two workers", one, two)
     if asked.quick:
         _identical("in this process", one, campaign(of, Here))
-    pools: list[Killing] = []
-
-    def opened() -> Workers:
-        pools.append(Killing(ready + 0.25 * two.seconds))
-        return pools[-1]
-
-    killed = campaign(of, opened)
-    hit = "one killed" if pools[0].killed else "none killed in time"
-    _identical(f"two workers, {hit} ({killed.seconds:.1f} s)", one, killed)
+    quarter = 0.25 * two.seconds
+    opened = partial(two_of_which_one_is_killed, ready + quarter)
+    _identical("two workers, one killed", one, campaign(of, opened))
     if not asked.no_dask:
-        dask = in_dask(of)
-        _identical(f"dask cluster of two ({dask.seconds:.1f} s)", one, dask)
-        dask = in_dask(of, 3.0 + 0.25 * two.seconds)
-        _identical(f"dask, one killed ({dask.seconds:.1f} s)", one, dask)
+        for words, after in (("dask", None), ("dask, one killed", _DASK_READY + quarter)):
+            with dask(after) as opened:
+                _identical(words, one, campaign(of, opened))
     _predict(one, two, ready, each)
 
 
-def _one_and_two(of: Problem, repeats: int) -> tuple[Measured, Measured]:
+def _one_and_two(of: Problem, repeats: int) -> list[Measured]:
     """The median of each, in turn."""
-    ones, twos = [], []
+    found: dict[int, list[Measured]] = {1: [], 2: []}
     for number in range(repeats):
-        pair = [(ones, 1), (twos, 2)]
-        for found, count in pair if number % 2 == 0 else pair[::-1]:
-            found.append(campaign(of, lambda count=count: Processes(count)))
-            print(
-                f"  {count} worker{'s' if count > 1 else ''}: {found[-1].seconds:.1f} s", flush=True
-            )
+        for count in (1, 2) if number % 2 == 0 else (2, 1):
+            found[count].append(campaign(of, partial(Processes, count)))
+            print(f"  workers {count}: {found[count][-1].seconds:.1f} s", flush=True)
     middle = (repeats - 1) // 2
-    ones.sort(key=lambda each: each.seconds)
-    twos.sort(key=lambda each: each.seconds)
-    return ones[middle], twos[middle]
+    return [sorted(every, key=lambda each: each.seconds)[middle] for every in found.values()]
 
 
 def _identical(words: str, one: Measured, other: Measured) -> None:
     same = "identical to the last bit" if identical(one.result, other.result) else "DIFFERENT"
-    print(f"{words}: {same}", flush=True)
+    print(f"{words} ({other.seconds:.1f} s): {same}", flush=True)
 
 
 def _predict(one: Measured, two: Measured, ready: float, each: float) -> None:
     """What more workers would take, each on a processor of its own like these."""
     starts, serial = list(one.starts), one.serial
-    work = sum(starts)
     many = list(np.random.default_rng(1).choice(starts, 1024))
 
     def predicted(durations: Sequence[float], workers: int) -> float:
@@ -259,7 +242,7 @@ def _predict(one: Measured, two: Measured, ready: float, each: float) -> None:
     print(f"{'workers':>8} {len(starts):>5} starts  times   work/N   1024 starts  times")
     for workers in (1, 2, *BEYOND):
         now, much = predicted(starts, workers), predicted(many, workers)
-        least = ready + serial + work / workers
+        least = ready + serial + sum(starts) / workers
         print(
             f"{workers:8} {now:10.1f} s {predicted(starts, 1) / now:6.1f} {least:7.1f} s "
             f"{much:10.1f} s {predicted(many, 1) / much:6.1f}"

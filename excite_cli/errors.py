@@ -12,10 +12,18 @@ from collections.abc import Iterable
 _ENOUGH_TO_GUESS = 3  # letters
 
 
+# A word that foreign files may have in a message, and what stays of a longer one, in characters.
+_LONGEST_WORD, _BEGINNING = 1000, 200
+
+
 class ExciteError(Exception):
     """Base of all errors raised on purpose; `exit_status` is what the command line returns."""
 
     exit_status = 2
+
+    def __init__(self, message: str = "") -> None:
+        long = rf"(\S{{{_BEGINNING}}})\S{{{_LONGEST_WORD - _BEGINNING},}}"
+        super().__init__(re.sub(long, r"\1…", str(message)))
 
 
 class ConfigError(ExciteError):

@@ -11,7 +11,7 @@ from functools import cache, partial
 import numpy as np
 
 from benchmarks.battery import changes
-from benchmarks.battery.cases import Case, model_columns
+from benchmarks.battery.cases import Case, first_made, model_columns
 from benchmarks.battery.changes import Draw, Scene
 from benchmarks.battery.columns import (
     drawn_series,
@@ -21,12 +21,11 @@ from benchmarks.battery.columns import (
     with_columns,
 )
 from benchmarks.battery.instruments import Instruments
-from benchmarks.battery.motions import Arm
+from benchmarks.battery.motions import FRICTION, Arm
 from benchmarks.battery.outside import MovedCenters
 from benchmarks.battery.scoring import FIRST_ORDER, Plant
 from benchmarks.battery.series import drawn_robot, robot_of, series, short_moves
 from benchmarks.battery.sizes import ground_of
-from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.spec import Spec
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
@@ -75,9 +74,7 @@ _IN_RUNS: tuple[Draw, ...] = (
     changes.friction_step,
     changes.gain_change,
 )
-_FRICTION = (EffectSpec(kind="viscous_friction"), EffectSpec(kind="coulomb_friction"))
 _MOVED = (0.02, 0.035)  # m by which a centre of mass may be off
-_ATTEMPTS = 80
 
 
 def group_of(seed: int, index: int) -> str:
@@ -97,11 +94,7 @@ def make_case(seed: int, index: int) -> Case:
     """The case of a seed and an index."""
     group = group_of(seed, index)
     rng = np.random.default_rng([seed, 15, index])
-    for _ in range(_ATTEMPTS):
-        case = _attempt(index, group, rng)
-        if case is not None:
-            return case
-    raise RuntimeError(f"case {index} of seed {seed} ({group}) cannot be made")
+    return first_made(lambda: _attempt(index, group, rng))
 
 
 def _attempt(index: int, group: str, rng: np.random.Generator) -> Case | None:
@@ -112,9 +105,9 @@ def _attempt(index: int, group: str, rng: np.random.Generator) -> Case | None:
     settings = _settings(group, rng)
     clock, instruments = _instruments(group, len(runs), settings.seed, rng)
     friction = _friction(group, rng)
-    declared = declared_effects(_FRICTION, of.robot) if friction != "none" else ()
+    declared = declared_effects(FRICTION, of.robot) if friction != "none" else ()
     inside = sized(of.robot, declared, settings.seed)
-    spec = of.spec.model_copy(update={"effects": _FRICTION if friction == "declared" else ()})
+    spec = of.spec.model_copy(update={"effects": FRICTION if friction == "declared" else ()})
     modelled = declared if friction == "declared" else ()
     phi = true_inertias(of.robot, settings.inertia_error, settings.seed)
     ground = ground_of(of.robot, phi, motions, inside, instruments.noise)
@@ -125,15 +118,8 @@ def _attempt(index: int, group: str, rng: np.random.Generator) -> Case | None:
         names = tuple(str(name) for name in rng.permutation([each.name for each in columns]))
         measurement = spec.measurement.model_copy(update={"covariates": names})
         spec = spec.model_copy(update={"measurement": measurement})
-    scene = Scene(
-        of,
-        ground,
-        model_columns(of, declared, ground),
-        runs,
-        held_out,
-        clock,
-        _sizes(of, inside),
-    )
+    model = model_columns(of, declared, ground)
+    scene = Scene(of, ground, model, runs, held_out, clock, _sizes(of, inside))
     changes = _plants(group, scene, friction, rng)
     if changes is None:
         return None
@@ -212,11 +198,9 @@ def _background(scene: Scene, inside: tuple[PlantedEffect, ...]) -> tuple[Plant,
     found = []
     for planted in inside:
         effect: Effect = planted.effect
-        name = effect.parameters[0].name
-        sizes = {name: float(planted.values[0])}
-        free = PlantedEffect(effect, planted.values)
+        sizes = {effect.parameters[0].name: float(planted.values[0])}
         joints = scene.names(effect.joints)
-        found.append(Plant((effect.kind,), joints, (free,), sizes=sizes, required=False))
+        found.append(Plant((effect.kind,), joints, (planted,), sizes=sizes, required=False))
     return tuple(found)
 
 

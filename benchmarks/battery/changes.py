@@ -204,20 +204,15 @@ def of_catalogue(kind: str, scene: Scene, rng: np.random.Generator) -> Plant | N
 
 def as_plant(scene: Scene, found: Sized) -> Plant:
     """With the sizes that people know it by."""
-    planted = found.planted
-    effect, values = planted.effect, planted.values
+    effect, values = found.planted.effect, found.planted.values
     reported = effect.report(values, np.zeros((len(values), len(values))))
-    own = (*reported.items(),)
-    sizes = {name: value.value for name, value in own if name not in effect.shape}
+    sizes = {name: x.value for name, x in reported.items() if name not in effect.shape}
+    names = scene.names(effect.joints)
     companions = tuple(Name(p.effect.kind, scene.names(p.effect.joints)) for p in found.companions)
     return Plant(
-        (effect.kind,),
-        scene.names(effect.joints),
-        (planted, *found.companions),
-        frozenset(effect.runs),
-        sizes=sizes,
-        companions=companions,
-    )
+        (effect.kind,), names, (found.planted, *found.companions), frozenset(effect.runs),
+        sizes=sizes, companions=companions,
+    )  # fmt: skip
 
 
 def beside(scene: Scene, plants: Sequence[Plant]) -> Scene:

@@ -14,6 +14,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, fields, replace
 from multiprocessing import get_context
 from pathlib import Path
@@ -27,11 +28,11 @@ from benchmarks.battery.decks import DECKS, Deck
 from benchmarks.battery.instruments import Recorded, recorded
 from benchmarks.battery.motions import CONFIGS
 from benchmarks.battery.scoring import (
+    PLAIN,
     Answer,
     Called,
     Name,
     Named,
-    Plant,
     Score,
     Truth,
     identity,
@@ -42,12 +43,12 @@ from excite_cli.api import diagnosing
 from excite_cli.api.identifying import identify
 from excite_cli.api.loading import Case as RobotCase
 from excite_cli.api.loading import load_data
+from excite_cli.atomic import write_text_atomically
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.diagnosis.records import Diagnosis, EffectRecord, NamedEffect
 from excite_cli.diagnosis.verdict import HeldOutVerdict
-from excite_cli.diagnosis.words import approximation_in_words
 from excite_cli.effects.catalogue import (
     EVERYDAY,
     EVERYDAY_FRICTION,
@@ -203,10 +204,16 @@ def _diagnosed(case: Case, data: Dataset, deck: Deck) -> Diagnosis:
     if deck.beside == "truth":
         return diagnose(case.robot.robot, case.robot.base, data, case.spec)
     robot = RobotCase(case.spec, CONFIGS, case.robot.robot)
+    with _in_a_file(data) as path:
+        return diagnosing.diagnose(robot, path, case.held_out, tell=lambda note: None)
+
+
+@contextmanager
+def _in_a_file(data: Dataset) -> Iterator[Path]:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "campaign.h5"
         write_dataset(path, data, {})
-        return diagnosing.diagnose(robot, path, case.held_out, tell=lambda note: None)
+        yield path
 
 
 def _checked(dataset: Dataset, case: Case) -> Dataset:
@@ -227,9 +234,7 @@ def _textbook(case: Case, data: Dataset) -> float:
         told = case.spec.model_dump(exclude_unset=True) | {"effects": effects}
         spec = Spec.model_validate(told | {"identification": {"inertias": "free"}})
         robot = RobotCase(spec, CONFIGS, case.robot.robot)
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "log.h5"
-            write_dataset(path, data, {})
+        with _in_a_file(data) as path:
             errors.append(identify(robot, load_data(robot, path)).error.mean_relative_moving)
     return min(errors)
 
@@ -245,18 +250,16 @@ def oracle(case: Case, dataset: Dataset) -> Diagnosis:
 
 
 def _spec(planted: PlantedEffect, case: Case) -> list[EffectSpec]:
-    """The effect as columns that the declared model does not have yet."""
+    """The effect as columns that the declared model does not have yet; none if it has no name."""
     effect, names = planted.effect, case.robot.robot.joint_names
-    friction = case.friction == "declared"
-    if effect.kind not in catalogue():
-        return []  # no declaration knows it
-    if friction and effect.kind in ("viscous_friction", "coulomb_friction"):
+    declared = case.friction == "declared"
+    if effect.kind not in catalogue() or (declared and effect.kind in PLAIN):
         return []
     joints = tuple(names[j] for j in effect.joints)
-    others = identity(Name(effect.kind, joints), friction)
     own = EffectSpec(
         kind=effect.kind, joints=joints, shape=dict(effect.shape), runs=effect.runs or "all"
     )
+    others = identity(Name(effect.kind, joints), declared)
     return [EffectSpec(kind=o.kind, joints=o.joints, shape={}, runs="all") for o in others] or [own]
 
 
@@ -347,57 +350,25 @@ def _describe(outcome: Outcome, case: Case) -> None:
         outcome.correlation = case.settings.noise_correlation
     required = [plant for plant in case.plants if plant.required]
     outcome.planted = [
-        {**_record(plant), "visible": visible}
+        {
+            "kind": plant.kinds[0],
+            "joints": list(plant.joints),
+            "words": plant.in_words,
+            "values": [float(x) for x in plant.effects[0].values],
+            "shape": dict(plant.effects[0].effect.shape),
+            "by_run": dict(plant.by_run),
+            "ratio": plant.ratio,
+            "visible": visible,
+        }
         for plant, visible in zip(required, case.visible or [np.nan] * len(required), strict=True)
     ]
 
 
-def _record(plant: Plant) -> dict:
-    effect, values = plant.effects[0].effect, plant.effects[0].values
-    return {
-        "kind": plant.kinds[0],
-        "joints": list(plant.joints),
-        "words": plant.in_words,
-        "values": [float(x) for x in values],
-        "shape": dict(effect.shape),
-        "by_run": dict(plant.by_run),
-        "ratio": plant.ratio,
-    }
-
-
 def _fill(outcome: Outcome, found: Diagnosis, answer: Answer, result: Score, deck: Deck) -> None:
-    outcome.named = [
-        {
-            "kind": each.effect.kind,
-            "joints": list(each.effect.joints),
-            "runs": list(each.effect.runs),
-            "covariate": each.effect.covariate,
-            "shape": dict(each.effect.shape),
-            "sizes": {name: [x.value, x.std] for name, x in each.parameters.items()},
-            "p_value": each.p_value,
-            "share": each.share_of_residual,
-            "gain": each.gain,
-            "judged": judged,
-            "verdict": str(each.verdict or ""),
-            "approximates": (
-                approximation_in_words(each.approximates) if each.approximates else ""
-            ),
-            "aliases": [
-                {"kind": a.kind, "joints": list(a.joints), "runs": list(a.runs)}
-                for a in each.aliases
-            ],
-        }
-        for each, judged in zip(found.effects, result.names, strict=True)
-    ]
-    outcome.unexplained = [
-        {
-            "joint": each.joint,
-            "share": each.predictable,
-            "depends_on": [covariate.code for covariate in each.depends_on],
-        }
-        for each in found.excess_residuals
-        if each.certain
-    ]
+    for each, judged in zip(found.effects, result.names, strict=True):
+        evidence = {name: value for name, value in asdict(each).items() if name != "effect"}
+        outcome.named.append({**asdict(each.effect), **evidence, "judged": judged})
+    outcome.unexplained = [asdict(each) for each in found.excess_residuals if each.certain]
     outcome.left = sorted(answer.said)
     outcome.found, outcome.right, outcome.wrong = list(result.found), result.right, result.wrong
     outcome.detected, outcome.seen, outcome.extra = result.detected, result.there, result.extra
@@ -410,9 +381,8 @@ def _fill(outcome: Outcome, found: Diagnosis, answer: Answer, result: Score, dec
     whole = "mean_relative" if deck.beside == "before" else "mean_relative_moving"
     outcome.before, outcome.after = getattr(found.before, whole), getattr(found.after, whole)
     elsewhere = all(each.effect.runs for each in found.effects)  # and not in the held-out run
-    outcome.worse = bool(found.effects) and not outcome.after < outcome.before * (
-        _UNCHANGED if elsewhere else 1.0
-    )
+    most = outcome.before * (_UNCHANGED if elsewhere else 1.0)
+    outcome.worse = bool(found.effects) and not outcome.after < most
     outcome.admitted = not found.good
     outcome.worse_joints = [joint for joint in found.joint_names if _unsaid_worse(found, joint)]
 
@@ -445,7 +415,10 @@ def _one(judged: Callable[[int, int], T], seed: int, index: int) -> T:
 def write(path: Path, seed: int, outcomes: Sequence[Outcome]) -> None:
     """Everything as JSON, whole after each case."""
     cases = [asdict(o) for o in sorted(outcomes, key=lambda o: o.index)]
-    partial = path.with_suffix(".partial")
     content = {"seed": seed, "cases": cases}
-    partial.write_text(json.dumps(content, indent=1, ensure_ascii=False, default=float))
-    partial.replace(path)
+    text = json.dumps(content, indent=1, ensure_ascii=False, default=_plain)
+    write_text_atomically(path, text)
+
+
+def _plain(value: object) -> object:
+    return float(value) if isinstance(value, np.generic) else str(value)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.load_spec import load_spec
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import BaseParameters, base_parameters_as_given
@@ -24,6 +25,7 @@ CONFIGS = Path(__file__).parents[2] / "configs"
 ROBOTS = ("ur10", "panda", "talos_arms")
 ACCELERATION = {"ur10": 10.0, "panda": 7.5, "talos_arms": 10.0}  # rad/s²
 HARMONICS, SECONDS = 5, 10.0
+FRICTION = (EffectSpec(kind="viscous_friction"), EffectSpec(kind="coulomb_friction"))
 _DRAWS, _KEPT = 40, 10
 _GRID = 80  # instants at which limits and regressor are evaluated
 

@@ -7,7 +7,7 @@ true: they may as well be told as an approximation, or as unexplained, but by no
 """
 
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -20,12 +20,21 @@ from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 
 
-class RubbingSector(Effect):
+class Unnamed(Effect):
+    """No kind of the catalogue."""
+
+    signature: ClassVar = ""
+    one_row: ClassVar = False  # of several joints only the first one has a torque
+
+    def rows(self, n: int) -> tuple[int, ...]:
+        return self.joints[:1] if self.one_row else super().rows(n)
+
+
+class RubbingSector(Unnamed):
     """τ_j = f exp(−(q_j − c)²/2w²) sgn v_j: a seal or a cable that rubs in one sector."""
 
     kind: ClassVar = "outside:rubbing_sector"
     title: ClassVar = "friction in one sector"
-    signature: ClassVar = ""
     parameters: ClassVar = (Parameter("friction", "N·m", 0.05, 300.0, nonnegative=True),)
     shapes: ClassVar = (Parameter("centre", "rad", 0.1, 3.0), Parameter("width", "rad", 0.1, 1.0))
 
@@ -35,7 +44,7 @@ class RubbingSector(Effect):
         return np.exp(-0.5 * away**2) * smooth_sign(signals.v[:, j, None])
 
 
-class DistantCoupling(Effect):
+class DistantCoupling(Unnamed):
     """τ_j = c v_k and τ_k = c v_j of joints that are no neighbours.
 
     With as much viscous friction of their own, which is declared, it only takes energy away.
@@ -43,7 +52,6 @@ class DistantCoupling(Effect):
 
     kind: ClassVar = "outside:distant_coupling"
     title: ClassVar = "viscous coupling of joints that are no neighbours"
-    signature: ClassVar = ""
     scope: ClassVar[Scope] = "pair"
     parameters: ClassVar = (Parameter("viscous", "N·m·s/rad", 0.01, 100.0),)
 
@@ -56,12 +64,11 @@ class DistantCoupling(Effect):
         return np.stack([signals.v[:, second], signals.v[:, first]], axis=1)[:, :, None]
 
 
-class HardeningSpring(Effect):
+class HardeningSpring(Unnamed):
     """τ_j = k (q_j − q_0)³."""
 
     kind: ClassVar = "outside:hardening_spring"
     title: ClassVar = "spring that hardens"
-    signature: ClassVar = ""
     parameters: ClassVar = (Parameter("stiffness", "N·m/rad³", 0.01, 2000.0, nonnegative=True),)
     shapes: ClassVar = (Parameter("rest", "rad", 0.1, 3.0),)
 
@@ -69,12 +76,11 @@ class HardeningSpring(Effect):
         return (signals.q[:, list(self.joints), None] - self.shape["rest"]) ** 3
 
 
-class TorqueHysteresis(Effect):
+class TorqueHysteresis(Unnamed):
     """The sensor remembers: z' = τ'/w (1 − z sgn τ'), h z is added to the torque τ it shows."""
 
     kind: ClassVar = "outside:torque_hysteresis"
     title: ClassVar = "hysteresis of the torque sensor"
-    signature: ClassVar = ""
     parameters: ClassVar = (Parameter("height", "N·m", 0.01, 100.0, nonnegative=True),)
     shapes: ClassVar = (Parameter("width", "N·m", 0.1, 100.0),)
     data_defect: ClassVar = True
@@ -103,19 +109,29 @@ _SHARES = np.array([0.4, 0.3, 0.2, 0.1])  # of the friction that each element ho
 _WAYS = np.array([0.25, 0.7, 1.6, 4.0])  # distances after which each of them slips
 
 
-class DahlBySpeed(DahlFriction):
-    """dz/dt = v/d (1 − z sgn v), integrated over time by Euler's steps."""
+class _InTime(DahlFriction):
+    """Friction of a joint with a memory of its own, in place of dry friction."""
 
-    title: ClassVar = "Dahl friction, integrated over time"
+    def memory(self, friction: float) -> Any:
+        raise NotImplementedError
 
     def build_into(
         self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
     ) -> None:
-        """At the joint, by its speed."""
+        """At the joint."""
         for j in self.joints:
-            robot.remember(j, _BySpeed(float(values[0]), self.shape["distance"]))
+            robot.remember(j, self.memory(float(values[0])))
             robot.add_to_joint(j, {"frictionloss": -float(values[0])})
         robot.tell_controller(self, values)
+
+
+class DahlBySpeed(_InTime):
+    """dz/dt = v/d (1 − z sgn v), integrated over time by Euler's steps."""
+
+    title: ClassVar = "Dahl friction, integrated over time"
+
+    def memory(self, friction: float) -> Any:
+        return _BySpeed(friction, self.shape["distance"])
 
 
 class _BySpeed:
@@ -132,10 +148,13 @@ class _BySpeed:
         return self._friction * self._z
 
 
-class MaxwellSlip(DahlFriction):
+class MaxwellSlip(_InTime):
     """Four springs in parallel, each of which slips at its own force (Iwan, Maxwell slip)."""
 
     title: ClassVar = "Maxwell slip of four elements"
+
+    def memory(self, friction: float) -> Any:
+        return _Elements(friction, self.shape["distance"])
 
     def columns(self, signals: Signals) -> Array:
         elements = _Elements(1.0, self.shape["distance"])
@@ -143,15 +162,6 @@ class MaxwellSlip(DahlFriction):
         elements.begin(float(q[0]), float(v[0]))
         bent = np.array([elements.torque(float(x), 0.0) for x in q])
         return (bent - smooth_sign(v))[:, None, None]
-
-    def build_into(
-        self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
-    ) -> None:
-        """At the joint."""
-        for j in self.joints:
-            robot.remember(j, _Elements(float(values[0]), self.shape["distance"]))
-            robot.add_to_joint(j, {"frictionloss": -float(values[0])})
-        robot.tell_controller(self, values)
 
 
 class _Elements:
@@ -198,12 +208,11 @@ def slice_of(robot: Robot, joint: int) -> slice:
     return slice(start, start + PARAMETERS_PER_BODY)
 
 
-class Carried(Effect):
+class Carried(Unnamed):
     """A body fixed to what the one joint named carries; values are its ten parameters there."""
 
     kind: ClassVar = "payload"
     title: ClassVar = "a body on any link"
-    signature: ClassVar = ""
     parameters: ClassVar = (
         Parameter("mass", "kg", 0.05, 50.0),
         *(Parameter(name, "kg·m", 0.001, 20.0) for name in ("mx", "my", "mz")),
@@ -227,12 +236,11 @@ class Carried(Effect):
         return signals.body.regressor[:, :, slice_of(robot, self.joints[0])]
 
 
-class MovedCenters(Effect):
+class MovedCenters(Unnamed):
     """Every body's centre of mass lies elsewhere by the three values given for its joint [m]."""
 
     kind: ClassVar = "moved_centers"
     title: ClassVar = "centres of mass that differ from the URDF's"
-    signature: ClassVar = ""
     parameters: ClassVar = (Parameter("shift", "m", 0.0, 0.1),)
 
     def build_into(
@@ -252,7 +260,7 @@ class MovedCenters(Effect):
         return np.zeros((len(signals.t), len(self.joints), 3 * len(self.joints)))
 
 
-class PositionMap(Effect):
+class PositionMap(Unnamed):
     """τ_j = A Σ_k w_k cos(a_k q_j + b_k q_i + c_k): a smooth torque over two positions.
 
     As hoses, springs across joints and magnets make it. Energy is not kept account of.
@@ -260,15 +268,10 @@ class PositionMap(Effect):
 
     kind: ClassVar = "outside:position_map"
     title: ClassVar = "torque over two positions"
-    signature: ClassVar = ""
     parameters: ClassVar = (Parameter("height", "N·m", 0.01, 300.0),)
-
-    def rows(self, n: int) -> tuple[int, ...]:
-        """The first joint."""
-        return self.joints[:1]
+    one_row: ClassVar = True
 
     def columns(self, signals: Signals) -> Array:
-        """(T, 1, 1)."""
         own, other = (signals.q[:, j] for j in self.joints)
         s = self.shape
         bump = np.exp(
@@ -278,39 +281,29 @@ class PositionMap(Effect):
         return (wave + 1.5 * bump)[:, None, None]
 
 
-class DirectionMap(Effect):
+class DirectionMap(Unnamed):
     """τ_j = A sgn(v_j) (1 + sin(n q_i + φ)): dry friction that another joint's angle loads."""
 
     kind: ClassVar = "outside:direction_map"
     title: ClassVar = "friction over another joint's position"
-    signature: ClassVar = ""
     parameters: ClassVar = (Parameter("height", "N·m", 0.01, 300.0, nonnegative=True),)
-
-    def rows(self, n: int) -> tuple[int, ...]:
-        """The first joint."""
-        return self.joints[:1]
+    one_row: ClassVar = True
 
     def columns(self, signals: Signals) -> Array:
-        """(T, 1, 1)."""
         j, other = self.joints
         shape = 1.0 + np.sin(self.shape["turns"] * signals.q[:, other] + self.shape["phase"])
         return (smooth_sign(signals.v[:, j]) * shape)[:, None, None]
 
 
-class SpeedProduct(Effect):
+class SpeedProduct(Unnamed):
     """τ_j = A v_j v_i², a product of two quantities: drag that grows with another joint's speed."""
 
     kind: ClassVar = "outside:speed_product"
     title: ClassVar = "drag that another joint's speed raises"
-    signature: ClassVar = ""
     parameters: ClassVar = (Parameter("height", "N·m·s³", 0.001, 300.0, nonnegative=True),)
-
-    def rows(self, n: int) -> tuple[int, ...]:
-        """The first joint."""
-        return self.joints[:1]
+    one_row: ClassVar = True
 
     def columns(self, signals: Signals) -> Array:
-        """(T, 1, 1)."""
         j, other = self.joints
         return (signals.v[:, j] * signals.v[:, other] ** 2)[:, None, None]
 
@@ -331,19 +324,17 @@ def map_shape(kind: type[Effect], rng: np.random.Generator, ranges: Array) -> di
     return {}
 
 
-class Thinning(Effect):
+class Thinning(Unnamed):
     """Friction that thins: f (exp(−k δ) − 1) with δ = c − c₀, k = `rate`, f Coulomb and viscous."""
 
     kind: ClassVar = "outside:thinning"
     title: ClassVar = "friction that thins with a column"
-    signature: ClassVar = ""
     parameters: ClassVar = (
         Parameter("coulomb", "N·m", 0.01, 300.0),
         Parameter("viscous", "N·m·s/rad", 0.01, 300.0),
     )
 
     def columns(self, signals: Signals) -> Array:
-        """(T, 1, 2)."""
         deviation = signals.covariates[self.covariate] - self.shape["reference"]
         thinner = np.expm1(-self.shape["rate"] * deviation)
         v = signals.v[:, self.joints[0]]

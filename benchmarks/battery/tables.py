@@ -226,18 +226,9 @@ def in_detail(judged: Judged) -> str:
         return "\n".join([*text, o.error])
     if judged.case is not None and judged.case.instruments is not None:
         text.append(f"instruments: {judged.case.instruments}")
-    text += [f"named ({each['judged']}): {each}" for each in o.named]
-    text += [f"unexplained: {each}" for each in o.unexplained]
-    text += [f"absorbed: {a.kind}@{where(a.joints)} left {a.left:.1e}" for a in found.absorbed]
-    text += [f"finding: {f.severity} {f.kind} {f.run} {f.joints}: {f.text}" for f in found.findings]
-    text += [f"size: {size}" for size in o.sizes]
-    for r in found.rounds:
-        text.append(f"round {r.index}: {r.verdict}")
-        text += [
-            f"    {s.effect.kind}@{where(s.effect.joints)} {s.effect.shape} {s.effect.runs} "
-            f"p {s.p_value:.1e} share {s.share_of_residual:.3f} gain {s.gain:.3f}: {s.verdict}"
-            for s in r.suspects
-        ]
+    parts = {"named": o.named, "unexplained": o.unexplained, "absorbed": found.absorbed,
+             "finding": found.findings, "size": o.sizes, "round": found.rounds}  # fmt: skip
+    text += [f"{name}: {each}" for name, listed in parts.items() for each in listed]
     text += [f"processing: {name} = {value}" for name, value in found.processing.items()]
     before, after = found.before.relative_moving, found.after.relative_moving
     text += [

@@ -1,1 +1,1 @@
-"""Peers on one problem, side by side: FIGAROH, finite differences, and this program."""
+"""Other tools beside this program: exciting motions (the races), and dynamics from logs."""

@@ -16,10 +16,10 @@ import time
 from importlib import metadata
 from pathlib import Path
 
-from benchmarks.peers import figaroh_races, our_races
-from benchmarks.peers.judge import Judge
-from benchmarks.peers.race import Measure, Race
-from benchmarks.peers.table import Comparison, Entry, markdown, placed
+from benchmarks.peers import races
+from benchmarks.peers.motion_judge import CONTESTANTS, Judge, race_of_ours
+from benchmarks.peers.motion_table import PART, Comparison, Entry, dated_goals, markdown
+from benchmarks.peers.races import Measure, Race
 from benchmarks.problems import CONFIGS
 from excite_cli.atomic import write_text_atomically
 
@@ -37,9 +37,9 @@ def main() -> None:
     parser.add_argument("--goals", type=Path, help="put the goals between the marks of this page")
     arguments = parser.parse_args()
     judge = Judge(arguments.config.resolve())
-    peer = figaroh_races.find(arguments.figaroh_python, judge.problem.robot.description)
+    peer = races.find(arguments.figaroh_python, judge.problem.robot.description)
     if peer is None:
-        print(figaroh_races.HOW_TO_INSTALL, "\nGoing on with the others.\n", flush=True)
+        print(races.HOW_TO_INSTALL, "\nGoing on with the others.\n", flush=True)
     judge.keeps_config(judge.problem.still(judge.problem.robot.posture), True)  # fills all caches
     entries: list[Entry] = []
     for seed in arguments.seeds:
@@ -49,15 +49,12 @@ def main() -> None:
     text = markdown(comparison)
     print(text)
     if arguments.goals is not None:
-        page = placed(arguments.goals.read_text(encoding="utf-8"), comparison)
-        write_text_atomically(arguments.goals, page)
+        PART.write(arguments.goals, dated_goals(comparison))
     if arguments.markdown is not None:
         write_text_atomically(arguments.markdown, text)
 
 
-def one_seed(
-    judge: Judge, peer: figaroh_races.Figaroh | None, seed: int, seconds: float
-) -> list[Entry]:
+def one_seed(judge: Judge, peer: races.Figaroh | None, seed: int, seconds: float) -> list[Entry]:
     """All contestants, one after the other."""
     columns: tuple[int, ...] | None = None
     entries = []
@@ -66,8 +63,8 @@ def one_seed(
             for race in peer.races(seed, self_collision, seconds, judge.columns):
                 columns = race.columns
                 entries.append(_judged(judge, race, columns))
-    for name in our_races.CONTESTANTS:
-        entries.append(_judged(judge, our_races.race(judge, name, seed, columns), columns))
+    for name in CONTESTANTS:
+        entries.append(_judged(judge, race_of_ours(judge, name, seed, columns), columns))
     return entries
 
 

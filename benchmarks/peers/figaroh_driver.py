@@ -1,269 +1,182 @@
-"""FIGAROH's optimal trajectory of a robot, run by FIGAROH's own interpreter and nothing else.
+"""FIGAROH's identification of a robot, run by FIGAROH's own interpreter and nothing else.
 
-    python figaroh_driver.py request.json answer.npz
+    python figaroh_driver.py FOLDER ANSWER.npz CUT_OFF DECIMATION [JOINT JOINT]
 
-This file imports FIGAROH, cyipopt, Pinocchio and NumPy only: it is started as a program of its own,
-so that FIGAROH may live in another environment. FIGAROH is not changed: its problem class is
-subclassed to note, at every point that IPOPT asks for, the time, the value and the point. What was
-noted is judged afterwards by FIGAROH's own functions, off the clock.
-
-The clock starts when IPOPT starts. Imports, the robot, base parameters and the search for a random
-start are not counted.
+Its pipeline as in its TX40 example: friction, armature and offset of every joint, its Butterworth
+filter, its decimation, base parameters by QR, weighted least squares. It takes one recording:
+several are put one after the other with a smooth second between them, and its sample mask leaves
+out that, what is held out and the borders that its filters reach over. Predicted torques are its
+regressor times its base parameters, as in its own validation. Two joints that are named have
+coupled motors: the columns for these are those that the helper class of its TX40 example has.
 """
 
 import json
 import logging
 import sys
-import time
+from importlib import metadata
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pinocchio as pin
-from figaroh.optimal.base_optimal_trajectory import (
-    BaseOptimalTrajectory,
-    BaseTrajectoryIPOPTProblem,
-)
+from exchange import Given, Recording, read_given, write_answer
+from figaroh.data.trajectory import JOINT_FORCE, JOINT_TORQUE, TrajectoryData
+from figaroh.identification.base_identification import BaseIdentification
+from figaroh.tools.regressor import build_regressor_basic, build_regressor_reduced
 from figaroh.tools.robot import load_robot
-
-# Bounds may be missed by this much [rad, rad/s, N·m, m]: a thousand times FIGAROH's own tolerance.
-LENIENT = 1e-3
-CONTROLLER_RATE = 1000.0
+from scipy.interpolate import CubicHermiteSpline
 
 
-class TimedProblem(BaseTrajectoryIPOPTProblem):
-    """FIGAROH's problem, with a note of every point that is not a probe of its differences."""
-
-    def __init__(self, *arguments: Any) -> None:
-        super().__init__(*arguments)
-        self.notes: list[tuple[float, float, float, np.ndarray]] = []
-        self.calls = 0
-        self.seconds = {"objective": 0.0, "gradient": 0.0, "jacobian": 0.0}
-        self.began: tuple[float, float] | None = None
-        self.limit = np.inf
-        self._probing = False
-
-    def objective(self, X: np.ndarray) -> float:
-        self.calls += 1
-        if self._probing:
-            return float(super().objective(X))
-        value = float(super().objective(X))
-        if self.began is not None:
-            wall = time.perf_counter() - self.began[0]
-            self.notes.append((wall, time.process_time() - self.began[1], value, np.array(X)))
-        return value
-
-    def intermediate(self, *arguments: Any, **named: Any) -> bool:
-        """FIGAROH's own bookkeeping; False, which ends IPOPT, once the time is up."""
-        going_on = super().intermediate(*arguments, **named)
-        if self.began is not None and time.process_time() - self.began[1] > self.limit:
-            return False
-        return going_on is None or bool(going_on)
-
-    def gradient(self, X: np.ndarray) -> np.ndarray:
-        self._probing = True
-        began = time.perf_counter()
-        try:
-            return np.asarray(super().gradient(X))
-        finally:
-            self._probing = False
-            self.seconds["gradient"] += time.perf_counter() - began
-
-    def jacobian(self, X: np.ndarray) -> np.ndarray:
-        began = time.perf_counter()
-        try:
-            return np.asarray(super().jacobian(X))
-        finally:
-            self.seconds["jacobian"] += time.perf_counter() - began
-
-    def solve_with_waypoints(self, wps: np.ndarray) -> tuple[bool, dict[str, Any]]:
-        self.before = time.process_time()
-        self.began = (time.perf_counter(), self.before)
-        try:
-            return super().solve_with_waypoints(wps)
-        finally:
-            self.wall = time.perf_counter() - self.began[0]
-            self.processor = time.process_time() - self.began[1]
-            self.began = None
-
-
-class TimedTrajectory(BaseOptimalTrajectory):
-    """FIGAROH's generator; keeps the problem that it solved."""
-
-    problem: TimedProblem | None = None
-    limit = np.inf
-
-    def create_ipopt_problem(self, *arguments: Any) -> TimedProblem:
-        self.problem = TimedProblem(self, *arguments)
-        self.problem.limit = self.limit
-        return self.problem
-
-
-def main() -> None:
-    logging.disable(logging.WARNING)
-    asked = Path(sys.argv[1])
-    answer = solve(json.loads(asked.read_text()), asked.with_name("figaroh.yaml"))
-    np.savez(sys.argv[2], **answer)
-
-
-def solve(request: dict[str, Any], config: Path) -> dict[str, Any]:
-    """One segment from one random start, and what became of it; `config` is written for FIGAROH."""
-    write_config(request, config)
-    robot = load_robot(request["urdf"], package_dirs=request["package_dirs"], load_by_urdf=True)
-    set_limits(robot.model, request)
-    if not request["self_collision"]:
-        robot.geom_model = None
-    np.random.seed(request["seed"])  # noqa: NPY002 - it is what FIGAROH draws from
-    generator = TimedTrajectory(robot, request["joints"], str(config))
-    generator.limit = request["seconds"]
-    joints = [robot.model.joints[robot.model.getJointId(name)] for name in request["joints"]]
-    generator.identif_config["act_idxq"] = [joint.idx_q for joint in joints]
-    generator.identif_config["act_idxv"] = [joint.idx_v for joint in joints]
-    began = time.perf_counter()
-    generator.initialize()
-    prepared = time.perf_counter() - began
-    began = time.perf_counter()
-    results = generator.solve(stack_reps=1)
-    solved = time.perf_counter() - began
-    return judged(generator, results, {"prepared": prepared, "solved": solved}, request)
-
-
-def set_limits(model: pin.Model, request: dict[str, Any]) -> None:
-    """The limits of the example's URDF, whatever the URDF says."""
-    for name, limit in request["limits"].items():
-        joint = model.joints[model.getJointId(name)]
-        model.lowerPositionLimit[joint.idx_q] = limit["position"][0]
-        model.upperPositionLimit[joint.idx_q] = limit["position"][1]
-        model.velocityLimit[joint.idx_v] = limit["velocity"]
-        model.effortLimit[joint.idx_v] = limit["effort"]
-
-
-def write_config(request: dict[str, Any], path: Path) -> None:
-    """FIGAROH's config (JSON is YAML)."""
-    config = {
+# --- what a user writes
+def config(given: Given, rate: float, cut_off: float) -> dict:
+    return {
+        "robot": {
+            "name": "robot",
+            "properties": {"joints": {"active_joints": list(given.joints)}},
+        },
         "tasks": {
             "identification": {
                 "enabled": True,
                 "problem": {
                     "use_joint_torques": True,
                     "include_external_forces": False,
+                    "wls": True,
                     "model_components": {
-                        "friction": False,
-                        "joint_offset": False,
-                        "actuator_inertia": False,
+                        "friction": True,
+                        "joint_offset": True,
+                        "actuator_inertia": True,
                     },
                 },
-            },
-            "optimal_trajectory": {
-                "enabled": True,
-                "problem": request["problem"],
-                "trajectory": request["trajectory"],
-            },
-        },
-        "robot": {
-            "name": "ur10",
-            "properties": {"joints": {"active_joints": request["joints"]}},
+                "signal_processing": {
+                    "sampling_frequency": rate,
+                    "cutoff_frequency": cut_off,
+                    "filter_type": "butterworth",
+                    "filter_order": 4,
+                },
+            }
         },
     }
-    path.write_text(json.dumps(config))
 
 
-def judged(
-    generator: TimedTrajectory,
-    results: dict[str, Any],
-    seconds: dict[str, float],
-    request: dict[str, Any],
-) -> dict[str, Any]:
-    """Improving points that keep FIGAROH's constraints, and the best of them in full.
+class Identification(BaseIdentification):
+    def __init__(self, robot, file: Path, given: Given) -> None:
+        super().__init__(robot, str(file))
+        self.given = given
+        model = robot.model
+        joints = [model.joints[model.getJointId(name)] for name in given.joints]
+        self.identif_config["act_idxq"] = [joint.idx_q for joint in joints]
+        self.identif_config["act_idxv"] = [joint.idx_v for joint in joints]
 
-    `claimed_`: with meshes looked at where its optimiser looks at them only.
-    """
-    problem = generator.problem
-    assert problem is not None
-    columns = request["columns"]
-    kept, best = improving(problem, request["self_collision"], columns)
-    claimed, best_claimed = improving(problem, False, columns)
-    answer: dict[str, Any] = {
-        "curve": kept,
-        "claimed_curve": claimed,
-        "found": np.array(bool(results["T_F"])),
-        "lowest_anywhere": np.array(min((note[2] for note in problem.notes), default=np.inf)),
-        "iterations": np.array(len(problem.iteration_data["iterations"])),
-        "objective_calls": np.array(problem.calls),
-        "seconds_gradient": np.array(problem.seconds["gradient"]),
-        "seconds_jacobian": np.array(problem.seconds["jacobian"]),
-        "wall": np.array(problem.wall),
-        "processor": np.array(problem.processor),
-        "processor_before": np.array(problem.before),
-        "seconds_prepared": np.array(seconds["prepared"]),
-        "seconds_solved": np.array(seconds["solved"]),
-        "pairs": np.array(generator.constraint_manager.n_pairs),
-        "start_is_clear": np.array(starts_clear(problem)),
-        "eliminated": np.asarray(generator.idx_e),
-        "base": np.asarray(generator.idx_b),
-    }
-    for prefix, x in (("", best), ("claimed_", best_claimed)):
-        for name, rate in (("sample", None), ("fine", CONTROLLER_RATE)):
-            if x is not None:
-                found = states(problem, x, rate)
-                answer |= {f"{prefix}{name}_{key}": value for key, value in found.items()}
-    return answer
+    def load_trajectory_data(self, data_source=None):
+        recordings = bridged(self.given.recordings)
+        step = float(np.mean(np.diff(recordings[0].t)))
+        sliding = [
+            self.model.joints[self.model.getJointId(name)].shortname().startswith("JointModelP")
+            for name in self.given.joints
+        ]
+        count = sum(len(r.t) for r in recordings)
+        return TrajectoryData(
+            t=step * np.arange(count),
+            joint_names=self.given.joints,
+            q=np.concatenate([r.q for r in recordings]),
+            effort=np.concatenate([r.tau for r in recordings]),
+            effort_kind=[JOINT_FORCE if s else JOINT_TORQUE for s in sliding],
+            effort_unit=["N" if s else "N·m" for s in sliding],
+            mask=np.concatenate([inner(r, self.ends, self.margin) for r in recordings]),
+        )
 
+    # --- until here, and more where motors are coupled
+    @property
+    def states(self):
+        return [self.processed_data[x] for x in ("velocities", "accelerations")]
 
-def improving(
-    problem: TimedProblem, clear: bool, columns: list[int]
-) -> tuple[np.ndarray, np.ndarray | None]:
-    """Points that keep FIGAROH's bounds and improve by its columns or by `columns`; the best.
+    def _compute_validation_metrics(self):
+        # It builds the regressor anew, without the columns that were added.
+        return None
 
-    Rows are wall and processor time, and the condition number by either; best is by FIGAROH's.
-    With `clear` the whole motion must be clear as FIGAROH checks it in the end (200 Hz, its
-    margin); without, meshes are only looked at where its optimiser does.
-    """
-    kept: list[tuple[float, float, float, float]] = []
-    best, lowest, lowest_other = None, np.inf, np.inf
-    for wall, processor, value, x in problem.notes:
-        if not problem._is_feasible(x, LENIENT):
-            continue
-        other = condition_number(problem, x, columns)
-        if value >= lowest and other >= lowest_other:
-            continue
-        if clear and not problem._is_collision_free(x):
-            continue
-        kept.append((wall, processor, value, other))
-        lowest_other = min(lowest_other, other)
-        if value < lowest:
-            lowest, best = value, x
-    return np.array(kept).reshape(-1, 4), best
+    def beside(self, rows, v, a, coupled):
+        """The regressor with armature, viscous and Coulomb friction of two coupled motors."""
+        one, other = (self.model.joints[self.model.getJointId(name)].idx_v for name in coupled)
+        more = np.zeros((self.model.nv, len(v), 3))
+        for j, k in ((one, other), (other, one)):
+            more[j] = np.stack([a[:, k], v[:, k], np.sign(v[:, one] + v[:, other])], axis=1)
+        return np.hstack([rows, more.reshape(-1, 3)])
 
 
-def condition_number(problem: TimedProblem, x: np.ndarray, columns: list[int]) -> float:
-    """Of other columns of the regressor, by Pinocchio, over FIGAROH's own samples."""
-    model, found = problem.opt_traj.robot.model, states(problem, x, None)
-    data = model.createData()
-    rows = [
-        pin.computeJointTorqueRegressor(model, data, *state)[:, columns].copy()
-        for state in zip(found["q"], found["v"], found["a"], strict=True)
-    ]
-    return float(np.linalg.cond(np.vstack(rows)))
+# --- what a user writes
+def bridged(recordings):
+    """The recordings with a smooth second of motion between them, which may not be used."""
+    found = [recordings[0]]
+    for one in recordings[1:]:
+        last, step = found[-1], float(np.mean(np.diff(one.t)))
+        t = np.arange(step, 1.0, step)
+        q = CubicHermiteSpline(
+            [0.0, t[-1] + step],
+            [last.q[-1], one.q[0]],
+            [(last.q[-1] - last.q[-11]) / (10 * step), (one.q[10] - one.q[0]) / (10 * step)],
+        )(t)
+        tau = last.tau[-1] + t[:, None] * (one.tau[0] - last.tau[-1])
+        found += [Recording(t, q, None, tau, np.zeros(len(t), bool)), one]
+    return found
 
 
-def starts_clear(problem: TimedProblem) -> bool:
-    """Whether the random start keeps clear of itself (always so when that is not asked for)."""
-    return bool(problem._is_collision_free(np.asarray(problem.get_initial_guess())))
+def inner(recording, ends: int, margin: int) -> np.ndarray:
+    """Samples that lie `margin` inside of what may be used, and `ends` inside of the recording."""
+    kept = np.zeros(len(recording.t), bool)
+    for part in recording.stretches:
+        kept[part.start + margin : part.stop - margin] = True
+    kept[:ends] = kept[-ends:] = False
+    return kept
 
 
-def states(problem: TimedProblem, x: np.ndarray, rate: float | None) -> dict[str, np.ndarray]:
-    """t, q, v, a of the waypoints x, at FIGAROH's own rate or another [Hz]."""
-    generator = problem.opt_traj
-    waypoints = np.vstack((problem.wp_init, x.reshape(problem.n_wps - 1, problem.n_joints)))
-    t, q, v, a = generator.CB.get_full_config(
-        rate or generator.trajectory_config["freq"],
-        problem.tps,
-        waypoints.T,
-        problem.vel_wps,
-        problem.acc_wps,
-    )
-    return {"t": np.asarray(t).ravel(), "q": q, "v": v, "a": a}
+def identified(
+    given: Given, folder: Path, cut_off: float, decimation: int, coupled
+) -> Identification:
+    rate = float((len(given.recordings[0].t) - 1) / np.ptp(given.recordings[0].t))
+    file = folder / "figaroh.yaml"
+    file.write_text(json.dumps(config(given, rate, cut_off)))
+    robot = load_robot(str(given.urdf), package_dirs=str(folder), load_by_urdf=True)
+    found = Identification(robot, file, given)
+    found.ends = round(1.5 / cut_off * rate)
+    found.margin = 3 * decimation if decimation > 1 else 0
+    found.initialize()
+    # --- until here, and more where motors are coupled
+    if coupled:
+        found.dynamic_regressor = found.beside(found.dynamic_regressor, *found.states, coupled)
+        found.standard_parameter |= {"Iam": 0.0, "fvm": 0.0, "fsm": 0.0}
+    # --- what a user writes
+    found.solve(decimation > 1, decimation, plotting=False, wls=True)
+    return found
+
+
+# --- until here
+
+
+def predicted(found: Identification, given: Given, coupled) -> list[np.ndarray]:
+    at = {x: found.identif_config[f"act_idx{x}"] for x in "qv"}
+    torques = []
+    for s in given.asked:
+        states = []
+        for x, index, width in ((s.q, at["q"], found.model.nq), (s.v, at["v"], found.model.nv),
+                                (s.a, at["v"], found.model.nv)):  # fmt: skip
+            full = np.zeros((len(x), width))
+            full[:, index] = x
+            states.append(full)
+        rows = build_regressor_basic(found.robot, *states, found.identif_config)
+        if coupled:
+            rows = found.beside(rows, *states[1:], coupled)
+        rows = build_regressor_reduced(rows, found._idx_eliminated)[:, found._base_indices]
+        tau = (rows @ found.phi_base).reshape(found.model.nv, len(s.q)).T
+        torques.append(tau[:, at["v"]])
+    return torques
+
+
+def main() -> None:
+    logging.disable(logging.WARNING)
+    folder, cut_off, decimation = Path(sys.argv[1]), float(sys.argv[3]), int(sys.argv[4])
+    coupled = sys.argv[5:]
+    given = read_given(folder)
+    found = identified(given, folder, cut_off, decimation, coupled)
+    told = f"FIGAROH {metadata.version('figaroh')}, Pinocchio {metadata.version('pin')}"
+    write_answer(Path(sys.argv[2]), predicted(found, given, coupled), told=told)
 
 
 if __name__ == "__main__":

@@ -70,9 +70,8 @@ def travelled(source: Source, folder: Path, seed: int) -> Record:
 
 def _travel(source: Source, steps: _Steps, seed: int) -> None:
     record = steps.record
-    proposal = steps.excite(
-        "init", *source.given, "-o", "robot.yaml", "--allow-found", "--overwrite"
-    )
+    begin = ("init", *source.given, "-o", "robot.yaml", "--allow-found", "--overwrite")
+    proposal = steps.excite(*begin)
     record["joints"] = len(proposal["joints"])
     record["base_parameters"] = proposal["base_parameters"]
     record["ignored_pairs"] = _ignored(steps.folder / "robot.yaml")
@@ -82,15 +81,8 @@ def _travel(source: Source, steps: _Steps, seed: int) -> None:
     record["proved"] = all(last["certified"].values())
     steps.excite("check", "robot.yaml", "motions.h5")
     record["admissible"] = True
-    draw = (
-        sys.executable,
-        "-m",
-        "benchmarks.robots.planting",
-        "robot.yaml",
-        "motions.h5",
-        str(seed),
-    )
-    plant = steps.run("draw", draw)
+    draw = (sys.executable, "-m", "benchmarks.robots.planting", "robot.yaml", "motions.h5")
+    plant = steps.run("draw", [*draw, str(seed)])
     record["planted"] = plant
     effects = [word for text in plant["effects"] for word in ("--effect", text)]
     played = ("robot.yaml", "motions.h5", "-o", "measured.h5", "--seed", str(seed), "--overwrite")

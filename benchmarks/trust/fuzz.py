@@ -15,13 +15,9 @@ from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 
-from benchmarks.trust.data_files import (
-    BagFuzzer,
-    CsvFuzzer,
-    Hdf5Fuzzer,
-    MotionFuzzer,
-    ResultFuzzer,
-)
+from benchmarks.trust.bag_files import BagFuzzer
+from benchmarks.trust.data_files import CsvFuzzer, MotionFuzzer
+from benchmarks.trust.hdf5_files import Hdf5Fuzzer, ResultFuzzer
 from benchmarks.trust.robot_files import ConfigFuzzer, UrdfFuzzer
 from benchmarks.trust.trial import MOST_SECONDS, Fuzzer, Verdict, attempt, generator, protect
 from excite_cli.workers.base import Tell, Workers

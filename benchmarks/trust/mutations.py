@@ -1,4 +1,8 @@
-"""Ways to spoil what is valid: numbers, texts, trees, lines, bytes and samples."""
+"""Ways to spoil what is valid: numbers, texts, trees, lines, bytes and samples.
+
+What is written by hand to run code, to read other files or to fill memory stands in `tests/trust/`,
+each with the message that it must get.
+"""
 
 import copy
 import re
@@ -25,6 +29,11 @@ _TEXTS = (
     *("", " ", "\x00", "\t", "\n", "\u202e", "\ufeff", "🤖" * 3, "a" * 300, "'; --"),
 )
 _NUMBER = re.compile(rb"-?\d+\.?\d*(?:[eE][-+]?\d+)?")
+# What a field of so many bytes may claim.
+_CLAIMS = (0, 1, 2**15, 2**16 - 1, 2**31, 2**32 - 1, 2**40, 2**63, 2**64 - 1)
+_CODES = ("utf-16", "utf-32", "utf-7", "cp037", "utf-8-sig")
+_SAMPLES = (np.nan, np.inf, -np.inf, 0.0, 1e308, -1e308, 1e-308, 5e-324, 1e18, 7.0)
+_LARGEST_FLOOD = 5.5  # power of ten
 
 
 def pick(rng: Rng, values: Sequence[Any]) -> Any:
@@ -32,20 +41,16 @@ def pick(rng: Rng, values: Sequence[Any]) -> Any:
     return values[int(rng.integers(len(values)))]
 
 
-def one_of(rng: Rng, ways: Mapping[str, Callable[[], T]]) -> tuple[str, T]:
-    """What one of the ways makes, with its name."""
-    name = pick(rng, list(ways))
-    return name, ways[name]()
+def one_of(rng: Rng, ways: Mapping[str, tuple[float, Callable[[], T]]]) -> tuple[str, T]:
+    """What one of the ways makes, with its name; each has a weight."""
+    weights = np.array([weight for weight, _ in ways.values()], dtype=float)
+    name = list(ways)[int(rng.choice(len(ways), p=weights / weights.sum()))]
+    return name, ways[name][1]()
 
 
 def chance(rng: Rng, share: float) -> bool:
     """True in `share` of all cases."""
     return bool(rng.random() < share)
-
-
-def large(rng: Rng, exponent: float) -> int:
-    """From ten to this power of it, by their logarithms."""
-    return int(10 ** rng.uniform(1, exponent))
 
 
 def odd_number(rng: Rng) -> Any:
@@ -76,28 +81,19 @@ def odd_value(rng: Rng, depth: int = 0) -> Any:
     return {odd_text(rng): odd_value(rng, depth + 1) for _ in range(int(rng.integers(0, 4)))}
 
 
-def places(tree: Any) -> list[tuple[Any, Any]]:
+def _places(tree: Any) -> list[tuple[Any, Any]]:
     """(holder, key) of everything inside a tree of dictionaries and lists."""
-    found: list[tuple[Any, Any]] = []
-    todo = [tree]
-    while todo:
-        node = todo.pop()
-        keys: Sequence[Any] = ()
-        if isinstance(node, dict):
-            keys = list(node)
-        elif isinstance(node, list):
-            keys = range(len(node))
-        for key in keys:
-            found.append((node, key))
-            todo.append(node[key])
-    return found
+    if not isinstance(tree, (dict, list)):
+        return []
+    keys = list(tree) if isinstance(tree, dict) else range(len(tree))
+    return [(tree, key) for key in keys] + [x for key in keys for x in _places(tree[key])]
 
 
 def spoiled_tree(rng: Rng, tree: Any, words: Sequence[str] = ()) -> Any:
     """A copy with a few places changed, moved, added or taken away."""
     tree = copy.deepcopy(tree)
     for _ in range(1 + int(rng.geometric(0.5))):
-        spots = places(tree)
+        spots = _places(tree)
         if not spots:
             return odd_value(rng)
         holder, key = pick(rng, spots)
@@ -114,10 +110,8 @@ def spoiled_tree(rng: Rng, tree: Any, words: Sequence[str] = ()) -> Any:
         elif isinstance(holder, dict):
             new = pick(rng, words) if words and chance(rng, 0.7) else odd_text(rng)
             holder[new] = holder.pop(key) if way == 5 else odd_value(rng)
-        elif way == 5:
-            holder.append(copy.deepcopy(holder[key]))
         else:
-            holder.insert(0, odd_value(rng))
+            holder.insert(0, copy.deepcopy(holder[key]) if way == 5 else odd_value(rng))
     return tree
 
 
@@ -126,34 +120,39 @@ def spoiled_bytes(rng: Rng, data: bytes, times: int = 0) -> bytes:
     raw = bytearray(data)
     for _ in range(times or 1 + int(rng.geometric(0.4))):
         if not raw:
-            return bytes(rng.integers(0, 256, 16, dtype=np.uint8))
+            return rng.bytes(16)
         start = int(rng.integers(len(raw)))
         size = min(int(rng.geometric(0.1)), len(raw) - start)
-        way = int(rng.integers(9))
+        part, width = slice(start, start + size), pick(rng, (2, 4, 8))
+        way = int(rng.integers(8))
         if way <= 1:
             raw[start] ^= 1 << int(rng.integers(8))
         elif way == 2:
-            raw[start] = int(rng.integers(256))
+            del raw[part]
         elif way == 3:
-            del raw[start : start + size]
+            raw[start:start] = raw[part]
         elif way == 4:
-            raw[start:start] = raw[start : start + size]
+            raw[part] = pick(rng, (b"\0", b"\xff", b"\x7f")) * size
         elif way == 5:
-            raw[start : start + size] = pick(rng, (b"\0", b"\xff", b"\x7f")) * size
+            raw[part] = rng.bytes(size)
         elif way == 6:
-            raw[start:start] = rng.bytes(size)
-        elif way == 7:
-            width = pick(rng, (2, 4, 8))
-            value = pick(rng, (0, 1, 2**15, 2**16 - 1, 2**31, 2**32 - 1, 2**40, 2**63, 2**64 - 1))
-            word = (value % 2 ** (8 * width)).to_bytes(width, pick(rng, ("little", "big")))
-            raw[start : start + width] = word
+            claim = pick(rng, _CLAIMS) % 2 ** (8 * width)
+            raw[start : start + width] = claim.to_bytes(width, pick(rng, ("little", "big")))
         elif chance(rng, 0.3):
             del raw[start:]
     return bytes(raw)
 
 
 def spoiled_text(rng: Rng, data: bytes, words: Sequence[bytes] = ()) -> bytes:
-    """Lines cut, doubled and swapped, numbers and words replaced; now and then bytes."""
+    """Lines cut, doubled and swapped, numbers and words replaced; now and then bytes or the code.
+
+    Seldom one of the `words` many thousand times: depth, long numbers, names and lines.
+    """
+    if words and chance(rng, 0.15):
+        at, count = int(rng.integers(len(data) + 1)), int(10 ** rng.uniform(1, _LARGEST_FLOOD))
+        return data[: at * chance(rng, 0.7)] + pick(rng, words) * count + data[at:]
+    if chance(rng, 0.03):
+        return data.decode("utf-8", "replace").encode(pick(rng, _CODES), "replace")
     for _ in range(1 + int(rng.geometric(0.5))):
         lines = data.split(b"\n")
         at, other = (int(rng.integers(len(lines))) for _ in range(2))
@@ -183,25 +182,17 @@ def odd_samples(rng: Rng, data: Mapping[str, Any]) -> dict[str, Any]:
     """Columns with NaN, jumps, constants, huge or tiny values, time that goes back or stands."""
     data = {name: array.copy() for name, array in data.items()}
     for _ in range(int(rng.integers(1, 4))):
-        name = pick(rng, list(data))
-        flat = data[name].reshape(len(data[name]), -1)
-        column = flat[:, int(rng.integers(flat.shape[1]))]
+        array = data[pick(rng, list(data))]
+        column = array.reshape(len(array), -1).T
+        column = column[int(rng.integers(len(column)))]
         rows = rng.random(len(column)) < pick(rng, (0.01, 0.2, 0.9, 1.1))
-        value = pick(rng, (np.nan, np.inf, -np.inf, 0.0, 1e308, -1e308, 1e-308, 5e-324, 1e18, 7.0))
-        way = int(rng.integers(6))
-        if way == 0:
-            column[rows] = value
-        elif way == 1:
-            column[:] = column[::-1].copy()
-        elif way == 2:
-            with np.errstate(over="ignore", under="ignore", invalid="ignore"):
-                column *= value
-        elif way == 3:
-            column[:] = rng.permutation(column)
-        elif way == 4:
-            column[:] = np.round(column, int(rng.integers(-2, 3)))
-        else:
-            column += pick(rng, (1.7e9, 1e6, -1e12, value))
+        value, digits = pick(rng, _SAMPLES), int(rng.integers(-2, 3))
+        with np.errstate(all="ignore"):
+            column[:] = pick(rng, (
+                np.where(rows, value, column), column[::-1], column * value,
+                np.round(column, digits), rng.permutation(column),
+                column + pick(rng, (1.7e9, 1e6, -1e12, value)),
+            ))  # fmt: skip
     if chance(rng, 0.2):
         most = int(pick(rng, (0, 1, 2, 9, 10, 11)))
         data = {name: array[:most] for name, array in data.items()}

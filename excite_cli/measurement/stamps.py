@@ -51,9 +51,11 @@ def equidistant(run: Run) -> tuple[list[Run], list[Finding]]:
         raise FileError(f"Run {run.name} has {len(run.t)} samples; at least {_FEWEST} are needed.")
     if not (run.t != run.t[0]).any():
         raise FileError(f"Run {run.name}: time stands still at {run.t[0]:g}: all stamps are equal.")
-    if not run.duration < BEYOND or 0 < _typical(np.diff(run.t)) < _SHORTEST_STEP:
+    steps = np.diff(run.t)
+    typical = _typical(steps) or _typical(-steps)  # where time only goes back
+    if not run.duration < BEYOND or 0 < typical < _SHORTEST_STEP:
         raise FileError(
-            f"Run {run.name}: samples follow each other within {_typical(np.diff(run.t)):.3g} s, "
+            f"Run {run.name}: samples follow each other within {typical:.3g} s, "
             f"from {run.t[0]:g} to {run.t[-1]:g} s: no clock gives such time stamps. Check "
             "measurement.time and the recorder."
         )

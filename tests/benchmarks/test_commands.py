@@ -11,7 +11,7 @@ import benchmarks
 
 ROOT = Path(__file__).parents[2]
 # Programs for interpreters of other tools: they import what is installed there.
-OTHERS = {"figaroh_driver", "sysid_driver", "urdf_driver", "wls_driver"}
+OTHERS = {"figaroh_driver", "figaroh_motion_driver", "sysid_driver", "urdf_driver", "wls_driver"}
 MODULES = [
     module.name
     for module in pkgutil.walk_packages(benchmarks.__path__, "benchmarks.")

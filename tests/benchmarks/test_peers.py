@@ -5,11 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.peers.figaroh_races import BLIND, CLEAR, LIMITS, find
+from benchmarks.peers.motion_table import PART, Comparison, Entry, dated_goals, goals, markdown
 from benchmarks.peers.our_driver import Clock, timed, with_columns
-from benchmarks.peers.our_races import OURS, OWN
-from benchmarks.peers.race import Measure, Race
-from benchmarks.peers.table import PART, Comparison, Entry, goals, markdown, placed
+from benchmarks.peers.races import BLIND, CLEAR, LIMITS, OURS, OWN, Measure, Race, find
 from benchmarks.problems import motion, problem
 from excite_cli.excitation.problem import Problem
 
@@ -128,12 +126,17 @@ def test_figaroh_that_is_not_there_is_none(small: Problem) -> None:
     assert find(Path("/nowhere/python"), small.robot.description) is None
 
 
-def test_the_goals_are_put_between_the_marks_of_a_page_and_nowhere_else() -> None:
+def test_the_goals_are_put_between_the_marks_of_a_page_and_nowhere_else(tmp_path: Path) -> None:
     found = compared(race(BLIND, 1, (40.0, 20.0)), race(OURS, 1, (2.0, 20.0)))
-    page = placed(f"above\n{PART.begin}\nold\n{PART.end}\nbelow", found)
+    path = tmp_path / "page.md"
+    path.write_text(f"above\n{PART.begin}\nold\n{PART.end}\nbelow")
+    PART.write(path, dated_goals(found))
+    page = path.read_text()
     assert page.startswith(f"above\n{PART.begin}\nMeasured on 2026-01-01.")
     assert page.endswith(f"{PART.end}\nbelow")
     assert "old" not in page
-    assert placed(page, found) == page
+    PART.write(path, dated_goals(found))
+    assert path.read_text() == page
+    path.write_text("no marks")
     with pytest.raises(ValueError, match="lacks"):
-        placed("no marks", found)
+        PART.write(path, dated_goals(found))

@@ -2,23 +2,15 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.sparse import csr_matrix
 
-from benchmarks.scoreboard.contestants import (
-    BODIES,
-    EXCITE,
-    FIGAROH,
-    SYSID,
-    TOLD,
-    URDF,
-    WLS,
-    Result,
-)
-from benchmarks.scoreboard.exchange import (
+from benchmarks.peers.exchange import (
     BEGIN,
     END,
     Given,
@@ -30,10 +22,23 @@ from benchmarks.scoreboard.exchange import (
     write_answer,
     write_given,
 )
-from benchmarks.scoreboard.judge import Verdict, _recording, judged, physical
-from benchmarks.scoreboard.plain_urdf import plain_urdf
-from benchmarks.scoreboard.record import Entry, merged, read_entries, write_entries
-from benchmarks.scoreboard.table import by_joint, names, page_part, short_table, simulated
+from benchmarks.peers.log_judge import Judge, Verdict, _recording, physical
+from benchmarks.peers.log_table import by_joint, names, page_part, short_table, simulated
+from benchmarks.peers.plain_urdf import plain_urdf
+from benchmarks.peers.tools import (
+    BODIES,
+    EXCITE,
+    FIGAROH,
+    SYSID,
+    TOLD,
+    URDF,
+    WLS,
+    Entry,
+    Result,
+    merged,
+    read_entries,
+    write_entries,
+)
 from excite_cli.api.loading import load_case
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.measurement.dataset import Run
@@ -54,6 +59,11 @@ def held_out(tau: np.ndarray, moving: np.ndarray, valid: np.ndarray | None = Non
     )  # fmt: skip
 
 
+def judged(run: PreparedRun, tau: np.ndarray) -> Verdict:
+    robot: Any = SimpleNamespace(robot=SimpleNamespace(joint_names=NAMES))
+    return Judge(robot, (run,), ()).verdict([tau])
+
+
 def test_judge_counts_errors_where_joints_move_and_samples_are_valid() -> None:
     tau = np.full((100, 2), 2.0)
     moving = np.ones((100, 2), bool)
@@ -63,7 +73,7 @@ def test_judge_counts_errors_where_joints_move_and_samples_are_valid() -> None:
     told = tau * np.array([1.1, 0.7])
     told[50:, 0] = 99.0  # it stands there
     told[:10, 1] = 99.0  # nobody knows what was there
-    found = judged(NAMES, [held_out(tau, moving, valid)], [told])
+    found = judged(held_out(tau, moving, valid), told)
     assert found.by_joint["a"] == pytest.approx(0.1)
     assert found.by_joint["b"] == pytest.approx(0.3)
     assert found.mean == pytest.approx(0.2)
@@ -73,7 +83,7 @@ def test_judge_counts_errors_where_joints_move_and_samples_are_valid() -> None:
 def test_judge_tells_the_error_of_the_torque_as_recorded() -> None:
     tau = np.full((40, 2), 2.0)
     run = replace(held_out(tau, np.ones((40, 2), bool)), tau_raw=np.full((40, 2), 4.0))
-    found = judged(NAMES, [run], [tau])
+    found = judged(run, tau)
     assert found.mean == 0.0
     assert found.raw == pytest.approx(0.5)
 

@@ -121,3 +121,11 @@ def test_time_that_cannot_be_used() -> None:
     scattered = rows_of(RUN, np.arange(len(RUN.t)) % 40 < 10)
     with pytest.raises(FileError, match=r"falls into 40 pieces.*too irregular"):
         equidistant(scattered)
+
+
+@pytest.mark.parametrize("t", [np.where(np.arange(120) < 119, 5e-324, 0.0),
+                               np.arange(120.0, 0.0, -1.0) * 1e-310])  # fmt: skip
+def test_time_that_goes_back_by_less_than_any_clock_counts(t: np.ndarray) -> None:
+    q = np.sin(np.arange(120.0))[:, None]
+    with pytest.raises(FileError, match="no clock gives such time stamps"):
+        equidistant(Run("r", t, q, q))

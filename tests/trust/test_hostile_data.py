@@ -14,7 +14,8 @@ import h5py
 import numpy as np
 import pytest
 
-from benchmarks.trust.data_files import JOINTS, BagFuzzer, recorded
+from benchmarks.trust.bag_files import BagFuzzer
+from benchmarks.trust.data_files import JOINTS, recorded
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import FileError
 from excite_cli.measurement import reader
@@ -193,3 +194,11 @@ def test_motion_archives(header: str, word: str, tmp_path: Path) -> None:
         for name in ("t", "q", "joint_names"):
             archive.writestr(f"{name}.npy", head + b"\0" * 100)
     assert word in refused(motion, path)
+
+
+def test_what_a_file_says_is_told_in_part(tmp_path: Path) -> None:
+    path = tmp_path / "motion.yaml"
+    path.write_text(f"joint_names: [a]\npoints: [{{positions: [1{'*a' * 40_000}]}}]\n")
+    message = refused(motion, path)
+    assert "motion.yaml" in message
+    assert len(message) < 1000

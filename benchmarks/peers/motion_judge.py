@@ -1,5 +1,6 @@
 """One judge for all contestants: limits, torques and meshes at 1 kHz, and both matrices."""
 
+import sys
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -7,8 +8,18 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from benchmarks.peers.figaroh_races import ACCELERATION, JOINTS, LIMITS, package_folders
-from benchmarks.peers.race import Race, States
+from benchmarks.peers.races import (
+    ACCELERATION,
+    JOINTS,
+    LIMITS,
+    OURS,
+    OWN,
+    Race,
+    States,
+    answered,
+    package_folders,
+    times_of,
+)  # fmt: skip
 from excite_cli import load_problem
 from excite_cli.constraints.base import Array
 from excite_cli.dynamics.regressor import InverseDynamics, Regressor
@@ -27,14 +38,13 @@ _ROUNDING = 1e-6
 class Verdict:
     """A motion at 1 kHz: what it breaks (in words), share of samples in collision, both matrices.
 
-    `largest`: share of the limit that is used, by kind; `gap`: least distance of meshes [m].
-    `deviation`: of predicted torques, in units of the noise of a sample, whatever the columns.
+    `gap`: least distance of meshes [m]. `deviation`: of predicted torques, in units of the noise
+    of a sample, whatever the columns.
     """
 
     broken: tuple[str, ...]
     colliding: float
     gap: float
-    largest: dict[str, float]
     by_figaroh: float
     by_excite: float
     deviation: float
@@ -67,6 +77,10 @@ class Judge:
     def cost(self) -> Array:
         """Instants of the cost."""
         return self.problem.cost_basis.times
+
+    def states(self, coefficients: Array, times: Array) -> States:
+        """A motion of ours at `times`."""
+        return States(times, *self.problem.trajectory.states(times, coefficients))
 
     def keeps_config(self, coefficients: Array, self_collision: bool) -> bool:
         """Whether a motion of ours keeps every constraint of the config at 1 kHz."""
@@ -110,7 +124,6 @@ class Judge:
             tuple(broken),
             self._colliding(fine.q[::_SHARE_EVERY]),
             max(gap, 0.0),
-            used,
             self.condition_number(samples, columns),
             self.condition_number(samples, None),
             self.deviation(samples),
@@ -156,6 +169,39 @@ class Judge:
         return float(np.mean(touching))
 
 
-def motion_states(problem: Problem, coefficients: Array, times: Array) -> States:
-    """A motion of ours at `times`."""
-    return States(times, *problem.trajectory.states(times, coefficients))
+# Of ours: gradient, self-collision, and whether FIGAROH's columns are taken for the cost.
+CONTESTANTS = {
+    OURS: ("exact", True, True),
+    OWN: ("exact", True, False),
+    "excite, finite differences": ("differences", True, True),
+    "excite, self-collision off": ("exact", False, True),
+}
+
+
+def race_of_ours(judge: Judge, name: str, seed: int, columns: tuple[int, ...] | None) -> Race:
+    """One motion of the judge's config; its curve has what the judge admits at 1 kHz only."""
+    gradient, self_collision, by_peer = CONTESTANTS[name]
+    request = {
+        "config": str(judge.config),
+        "overrides": [] if self_collision else ["constraints.self_collision=null"],
+        "seed": seed,
+        "gradient": gradient,
+        "columns": columns if by_peer else None,
+    }
+    answer = answered([sys.executable, "-m", "benchmarks.peers.our_driver"], request)
+    kept: list[Array] = []
+    lowest = np.full(2, np.inf)
+    for spent, coefficients in zip(answer["notes"], answer["coefficients"], strict=True):
+        samples = judge.states(coefficients, judge.cost)
+        values = np.array([judge.condition_number(samples, of) for of in (columns, None)])
+        if (values < lowest).any() and judge.keeps_config(coefficients, self_collision):
+            kept.append(np.concatenate([spent[:2], values]))
+            lowest = np.minimum(lowest, values)
+    final = answer.get("final")
+    fine, samples = (
+        None if final is None else judge.states(final, times) for times in (judge.fine, judge.cost)
+    )
+    return Race(
+        name, seed, np.array(kept).reshape(-1, 4), *times_of(answer), fine, samples, columns,
+        bool(answer["proved"]), {"says": str(answer["status"])},
+    )  # fmt: skip

@@ -8,11 +8,11 @@ torque went through. Whether a joint moves, too, is decided by the states.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from benchmarks.scoreboard.case import Case
-from benchmarks.scoreboard.exchange import Given, Recording, States
+from benchmarks.peers.exchange import Given, Recording, States
 from excite_cli.api.loading import Case as Loaded
 from excite_cli.api.loading import load_case, load_data
 from excite_cli.dynamics.pseudo_inertia import pseudo_inertias
@@ -22,6 +22,28 @@ from excite_cli.identification.processing import choose_processing
 from excite_cli.identification.split import split, whole
 from excite_cli.measurement.dataset import Run
 from excite_cli.robot.model import Array
+
+
+@dataclass(frozen=True)
+class Case:
+    """A config that declares no effect, its data, the run that is `held_out` (None: as excite
+    does).
+
+    `planted`: what a simulated robot has, by `benchmarks.robots.planting` (one record per effect).
+    `coupled`: joints whose motors are coupled, as authors of another tool say in their example.
+    """
+
+    name: str
+    words: str
+    config: Path
+    data: Path
+    held_out: str | None = None
+    planted: tuple[dict[str, Any], ...] = ()
+    coupled: tuple[str, ...] = ()
+
+    @property
+    def is_real(self) -> bool:
+        return not self.planted
 
 
 @dataclass(frozen=True)
@@ -53,23 +75,10 @@ class Judge:
 
     def verdict(self, torques: Sequence[Array], phi: Array | None = None) -> Verdict:
         """Of torques (T, n) at the states of every held-out part, and link inertias if any."""
-        return judged(self.case.robot.joint_names, self.held_out, torques, phi)
-
-
-def judged(
-    names: Sequence[str],
-    held_out: Sequence[PreparedRun],
-    torques: Sequence[Array],
-    phi: Array | None = None,
-) -> Verdict:
-    """As `Judge.verdict`."""
-    found = torque_errors(names, held_out, torques)
-    return Verdict(
-        found.mean_relative_moving,
-        found.relative_moving,
-        _raw(held_out, torques),
-        None if phi is None else physical(phi),
-    )
+        found = torque_errors(self.case.robot.joint_names, self.held_out, torques)
+        possible = None if phi is None else physical(phi)
+        raw = _raw(self.held_out, torques)
+        return Verdict(found.mean_relative_moving, found.relative_moving, raw, possible)
 
 
 def physical(phi: Array) -> bool:

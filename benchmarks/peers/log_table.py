@@ -6,17 +6,7 @@ from math import isfinite
 import numpy as np
 
 from benchmarks.pages import MarkedPart, percent, table
-from benchmarks.scoreboard.contestants import (
-    BODIES,
-    EXCITE,
-    FIGAROH,
-    SYSID,
-    TOLD,
-    URDF,
-    WLS,
-    Result,
-)
-from benchmarks.scoreboard.record import Entry
+from benchmarks.peers.tools import BODIES, EXCITE, FIGAROH, SYSID, TOLD, URDF, WLS, Entry, Result
 
 PART = MarkedPart("scoreboard", "benchmarks.scoreboard")
 TOOLS = (EXCITE, BODIES, FIGAROH, TOLD, SYSID, WLS, URDF)

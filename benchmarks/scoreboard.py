@@ -18,19 +18,32 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from benchmarks.scoreboard.case import REAL, Case
-from benchmarks.scoreboard.contestants import Result, tools, tried
-from benchmarks.scoreboard.exchange import write_given
-from benchmarks.scoreboard.judge import judge_of
-from benchmarks.scoreboard.ours import diagnosed
-from benchmarks.scoreboard.plain_urdf import plain_urdf
-from benchmarks.scoreboard.record import Entry, merged, read_entries, write_entries
-from benchmarks.scoreboard.simulated import simulated
-from benchmarks.scoreboard.table import PART, page_part, percent, short_table
-from excite_cli.atomic import write_text_atomically
+from benchmarks.peers.exchange import write_given
+from benchmarks.peers.log_judge import Case, judge_of
+from benchmarks.peers.log_table import PART, page_part, percent, short_table
+from benchmarks.peers.plain_urdf import plain_urdf
+from benchmarks.peers.simulated import simulated
+from benchmarks.peers.tools import (
+    Entry,
+    diagnosed,
+    merged,
+    read_entries,
+    tools,
+    tried,
+    write_entries,
+)
+from benchmarks.program import ROOT
 
-DOCS = Path(__file__).parents[2] / "docs"
+DATA, DOCS = ROOT / "data", ROOT / "docs"
 STORED = DOCS / "scoreboard.json"
+REAL = (
+    Case("tx40", "Stäubli TX40", DATA / "tx40" / "tx40.yaml", DATA / "tx40" / "tx40.h5",
+         coupled=("joint_5", "joint_6")),
+    Case("ur10", "UR10 (CB3)", DATA / "ur10_cb" / "ur10_cb.yaml",
+         DATA / "ur10_cb" / "ur10_exciting_trajectory.db3"),
+    Case("kr300", "KUKA KR300", DATA / "kr300" / "kr300.yaml", DATA / "kr300" / "kr300.h5", "C"),
+    Case("tiago", "PAL TIAGo", DATA / "tiago" / "tiago.yaml", DATA / "tiago" / "tiago.h5"),
+)  # fmt: skip
 
 
 def main() -> None:
@@ -76,31 +89,22 @@ def entry(case: Case, arguments: argparse.Namespace) -> Entry:
     """All tools on one log."""
     judge, folder = judge_of(case), arguments.folder / case.name
     write_given(folder, plain_urdf(judge.case.robot), judge.given(folder))
-    results: list[Result] = []
-    if arguments.tools is None or "excite" in arguments.tools:
-        results += diagnosed(case, judge, folder)
-    results += [
-        tried(tool, judge, folder)
-        for tool in tools(arguments.figaroh, arguments.sysid, case)
-        if arguments.tools is None or tool.name in arguments.tools
-    ]
+    wanted = arguments.tools
+    results = diagnosed(case, judge, folder) if wanted is None or "excite" in wanted else []
+    for tool in tools(arguments.figaroh, arguments.sysid, case):
+        if wanted is None or tool.name in wanted:
+            results.append(tried(tool, judge, folder))
     told = [f"{r.tool} {percent(r.verdict.mean) if r.verdict else r.told}" for r in results]
     print(f"{case.name} ({case.words}): {'; '.join(told)}", flush=True)
-    today = datetime.date.today().isoformat()
-    dates = {each.tool: today for each in results}
+    dates = dict.fromkeys([each.tool for each in results], datetime.date.today().isoformat())
     return Entry(case.name, case.words, case.is_real, tuple(results), dates)
 
 
 def publish(entries: list[Entry], readme: Path | None) -> None:
     """The page, the short table, and the README if it is given."""
-    pages = {DOCS / "scoreboard.md": page_part(entries, setting(entries))}
-    if readme is not None:
-        pages[readme] = short_table(entries)
-    for path, content in pages.items():
-        page = path.read_text(encoding="utf-8")
-        write_text_atomically(path, PART.replaced(page, content))
-    short = f"{PART.begin}\n{short_table(entries)}\n{PART.end}\n"
-    write_text_atomically(DOCS / "scoreboard_table.md", short)
+    PART.write(DOCS / "scoreboard.md", page_part(entries, setting(entries)))
+    for path in (DOCS / "scoreboard_table.md", *([] if readme is None else [readme])):
+        PART.write(path, short_table(entries))
 
 
 def setting(entries: list[Entry]) -> str:

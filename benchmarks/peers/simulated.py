@@ -12,8 +12,8 @@ import zlib
 from pathlib import Path
 from typing import Any
 
+from benchmarks.peers.log_judge import Case
 from benchmarks.program import excite, ran
-from benchmarks.scoreboard.case import Case
 from excite_cli.api.loading import load_case
 
 ROBOTS = ("ur5", "ur10", "panda", "kinova", "talos_left_arm", "z1", "xarm7", "ur3 as MJCF")
@@ -63,7 +63,7 @@ def _planned(robot: str, folder: Path) -> tuple[Path, Path]:
 def _as_mjcf(robot: str, folder: Path) -> Path:
     import mujoco
 
-    from benchmarks.scoreboard.plain_urdf import plain_urdf
+    from benchmarks.peers.plain_urdf import plain_urdf
 
     urdf = plain_urdf(load_case({"robot": {"urdf": f"example-robot-data:{robot}"}}).robot)
     path = folder / f"{robot}.xml"

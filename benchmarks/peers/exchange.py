@@ -1,11 +1,9 @@
 """What every tool is given and what it answers, as files that need NumPy alone.
 
 The drivers of other tools run in environments of their own and import this file from their folder.
-A folder of a case holds `robot.urdf`, `request.json`, `recordings.npz` and `asked.npz`; a tool adds
-`NAME.npz`.
+A folder of a case holds `robot.urdf` and `given.npz`; a tool adds `NAME.npz`.
 """
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -54,40 +52,32 @@ class Given:
     asked: tuple[States, ...]
 
 
+_OF_RECORDING, _OF_STATES = ("t", "q", "dq", "tau", "used"), ("q", "v", "a")
+
+
 def write_given(folder: Path, urdf: str, given: Given) -> None:
     """Everything but the answers; `urdf` is the text of the file."""
     folder.mkdir(parents=True, exist_ok=True)
     given.urdf.write_text(urdf, encoding="utf-8")
-    counts = {"recordings": len(given.recordings), "asked": len(given.asked)}
-    request = {"joints": given.joints, **counts}
-    (folder / "request.json").write_text(json.dumps(request), encoding="utf-8")
-    names = ("t", "q", "dq", "tau", "used")
-    np.savez(
-        folder / "recordings.npz",
-        **{
-            f"{name}_{k}": getattr(each, name)
-            for k, each in enumerate(given.recordings)
-            for name in names
-            if getattr(each, name) is not None
-        },
-    )
-    np.savez(
-        folder / "asked.npz",
-        **{f"{x}_{k}": getattr(s, x) for k, s in enumerate(given.asked) for x in "qva"},
-    )
+    parts = {"joints": np.array(given.joints)}
+    for kind, names in (("recordings", _OF_RECORDING), ("asked", _OF_STATES)):
+        for k, each in enumerate(getattr(given, kind)):
+            own = {f"{kind}_{k}_{name}": getattr(each, name) for name in names}
+            parts |= {name: values for name, values in own.items() if values is not None}
+    np.savez(folder / "given.npz", **parts)
 
 
 def read_given(folder: Path) -> Given:
     """What `write_given` wrote."""
-    request = json.loads((folder / "request.json").read_text(encoding="utf-8"))
-    told, asked = np.load(folder / "recordings.npz"), np.load(folder / "asked.npz")
-    names = ("t", "q", "dq", "tau", "used")
-    recordings = tuple(
-        Recording(*(told.get(f"{name}_{k}") for name in names))
-        for k in range(request["recordings"])
-    )
-    states = tuple(States(*(asked[f"{x}_{k}"] for x in "qva")) for k in range(request["asked"]))
-    return Given(folder / "robot.urdf", tuple(request["joints"]), recordings, states)
+    stored = np.load(folder / "given.npz")
+
+    def read(kind, names):
+        count = sum(name.startswith(kind) and name.endswith("_q") for name in stored.files)
+        return [[stored.get(f"{kind}_{k}_{name}") for name in names] for k in range(count)]
+
+    recordings = tuple(Recording(*each) for each in read("recordings", _OF_RECORDING))
+    asked = tuple(States(*each) for each in read("asked", _OF_STATES))
+    return Given(folder / "robot.urdf", tuple(stored["joints"].tolist()), recordings, asked)
 
 
 def write_answer(

@@ -6,10 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.pages import MarkedPart, table
-from benchmarks.peers.figaroh_races import BLIND, CLAIMED, CLEAR
-from benchmarks.peers.judge import Verdict
-from benchmarks.peers.our_races import OURS, OWN
-from benchmarks.peers.race import Measure, Race
+from benchmarks.peers.motion_judge import Verdict
+from benchmarks.peers.races import BLIND, CLAIMED, CLEAR, OURS, OWN, Measure, Race
 
 FASTER = 20.0
 THEIRS = (CLEAR, CLAIMED, BLIND)
@@ -69,9 +67,9 @@ def markdown(comparison: Comparison) -> str:
 PART = MarkedPart("peers", "benchmarks.peers")
 
 
-def placed(page: str, comparison: Comparison) -> str:
-    """`page` with the dated goals between its two marks."""
-    return PART.replaced(page, f"Measured on {comparison.date}.\n\n{goals(comparison)}")
+def dated_goals(comparison: Comparison) -> str:
+    """What stands between the marks of a page."""
+    return f"Measured on {comparison.date}.\n\n{goals(comparison)}"
 
 
 def goals(comparison: Comparison) -> str:
@@ -86,26 +84,14 @@ def goals(comparison: Comparison) -> str:
             slow = theirs.reached(target, measure)[1]
             quick = [race.reached(target, measure)[1] for race in ours]
             low = [race.at(theirs.processor, measure) for race in ours]
-            rows += [
-                [
-                    measure.words,
-                    f"{name}: seconds to its best, {target:.2f}",
-                    seconds(slow),
-                    spread(quick, seconds),
-                    spread([slow / each for each in quick], times, low_is_worst=True),
-                    f"≥ {FASTER:g} ×",
-                    passed(slow / max(quick) >= FASTER),
-                ],
-                [
-                    measure.words,
-                    f"{name}: condition number after its {theirs.processor:.0f} s",
-                    number(target),
-                    spread(low, number),
-                    spread([target / each for each in low], times, low_is_worst=True),
-                    "lower",
-                    passed(max(low) < target),
-                ],
-            ]
+            faster = spread([slow / each for each in quick], times, low_is_worst=True)
+            lower = spread([target / each for each in low], times, low_is_worst=True)
+            goal = f"{name}: seconds to its best, {target:.2f}"
+            rows.append([measure.words, goal, seconds(slow), spread(quick, seconds), faster,
+                         f"≥ {FASTER:g} ×", passed(slow / max(quick) >= FASTER)])  # fmt: skip
+            goal = f"{name}: condition number after its {theirs.processor:.0f} s"
+            rows.append([measure.words, goal, number(target), spread(low, number), lower,
+                         "lower", passed(max(low) < target)])  # fmt: skip
     heads = ["columns", "goal", "FIGAROH", "excite, median (worst)", "ratio", "required", ""]
     return table(heads, rows) if rows else ""
 
@@ -113,21 +99,15 @@ def goals(comparison: Comparison) -> str:
 def reached(comparison: Comparison, measure: Measure) -> str:
     """Processor time to given condition numbers, median and worst over the seeds."""
     targets = comparison.targets(measure)
-    first = f"processor time [s] to, by {measure.words} columns"
-    heads = [first, *(number(target) for target in targets)]
     rows = []
     for name in comparison.contestants:
-        races = comparison.races(name)
-        rows.append(
-            [
-                name,
-                *(
-                    spread([race.reached(target, measure)[1] for race in races], seconds)
-                    for target in targets
-                ),
-            ]
+        spent = (
+            [race.reached(target, measure)[1] for race in comparison.races(name)]
+            for target in targets
         )
-    return table(heads, rows)
+        rows.append([name, *(spread(each, seconds) for each in spent)])
+    first = f"processor time [s] to, by {measure.words} columns"
+    return table([first, *map(number, targets)], rows)
 
 
 def motions(comparison: Comparison) -> str:
@@ -139,29 +119,19 @@ def motions(comparison: Comparison) -> str:
     ]  # fmt: skip
     rows = []
     for entry in comparison.entries:
-        race, verdict = entry.race, entry.verdict
-        head = [race.contestant, str(race.seed)]
-        spent = [f"{race.processor:.1f}", f"{race.wall:.1f}", f"{race.before:.1f}"]
-        if verdict is None:
-            rows.append([*head, "none", "", "", *spent, "", "", _why(race)])
-            continue
-        rows.append(
-            [
-                *head,
-                number(verdict.by_figaroh),
-                number(verdict.by_excite),
-                number(verdict.deviation),
-                *spent,
-                f"{verdict.colliding:.1%}",
-                f"{1e3 * verdict.gap:.1f}",
-                _admissible(race, verdict),
-            ]
-        )
+        race, found = entry.race, entry.verdict
+        spent = [f"{each:.1f}" for each in (race.processor, race.wall, race.before)]
+        if found is None:
+            values, gaps = ["none", "", ""], ["", "", _why(race)]
+        else:
+            values = [number(x) for x in (found.by_figaroh, found.by_excite, found.deviation)]
+            gaps = [f"{found.colliding:.1%}", f"{1e3 * found.gap:.1f}", _admissible(race, found)]
+        rows.append([race.contestant, str(race.seed), *values, *spent, *gaps])
     return table(heads, rows)
 
 
 def _why(race: Race) -> str:
-    start, says = race.words.get("start"), str(race.words.get("says", "no motion"))
+    start, says = race.words.get("start"), race.words.get("says", "no motion")
     return f"random start {start}; it {says}" if start else says
 
 
