@@ -48,3 +48,18 @@ def limits_about(values: Iterable[float], share: float = 0.08) -> tuple[float, f
     low, high = min(shown), max(shown)
     room = share * max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-12)
     return low - room, high + room
+
+
+def in_figures(value: float, digits: int = 3) -> str:
+    """A number as people write it: `0.00123`, `5.19`, `12400`, `1.2e+07`; `∞` and `–` beside."""
+    if value != value:  # NaN
+        return "–"
+    if value == 0:
+        return "0"
+    if value in (float("inf"), float("-inf")):
+        return "∞" if value > 0 else "-∞"
+    if not 1e-4 <= abs(value) < 10 ** (digits + 3):
+        return f"{value:.{digits - 1}e}"
+    if abs(value) >= 10 ** (digits - 1):
+        return f"{value:.0f}"
+    return f"{value:#.{digits}g}".rstrip(".")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from excite_cli.diagnosis.traces import EffectTrace
 from excite_cli.report.chart import limits_about
 from excite_cli.report.plot import Curve, Panel, Plot, merged
-from excite_cli.report.residual_section import readable_unit, torque_or_force
+from excite_cli.report.residual_chart import readable_unit, torque_or_force
 from excite_cli.robot.model import Array
 
 PREDICTED = "torque that the effect predicts"

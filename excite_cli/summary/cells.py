@@ -1,7 +1,17 @@
 """Numbers in tables; what is not known is "-"."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from math import isnan, nan
+from typing import Any
+
+from excite_cli.fields import data_of
+from excite_cli.measurement.dataset import Finding
+
+
+def findings_data(findings: Iterable[Finding]) -> list[dict[str, Any]]:
+    """What was noticed about data, for `--json`."""
+    return [data_of(each, "kind", "severity", "run", "text") for each in findings]
+
 
 # The files that a command has written, told at the end of its answer.
 

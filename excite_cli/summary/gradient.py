@@ -6,6 +6,7 @@ from excite_cli.excitation.gradient_check import (
     PAPER_FORWARD_ERROR,
     GradientCheck,
 )
+from excite_cli.fields import data_of
 from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
 
@@ -29,15 +30,8 @@ _TIMES = {
 
 def gradient_answer(found: GradientCheck) -> Answer:
     """What `excite verify-gradient` answers."""
-    data = {
-        "variables": found.variables,
-        "samples": found.samples,
-        "base_parameters": found.base_parameters,
-        "condition_number": found.condition_number,
-        "relative_error": found.relative_error,
-        "seconds": found.seconds,
-        "passed": found.passed,
-    }
+    data = data_of(found, "variables", "samples", "base_parameters", "condition_number",
+                   "relative_error", "seconds", "passed")  # fmt: skip
     return Answer(tuple(gradient_parts(found)), data, good=found.passed)
 
 

@@ -5,8 +5,20 @@ from typing import Any, Protocol
 
 from excite_cli.checks.check_result import CheckResult
 from excite_cli.checks.sentences import written
+from excite_cli.fields import data_of
 from excite_cli.measurement.dataset import Dataset, Run
-from excite_cli.shown.answer import Answer, Command, Part, Parts, Table, as_word
+from excite_cli.shown.answer import (
+    Answer,
+    Command,
+    KeyFigure,
+    Page,
+    Part,
+    Parts,
+    Section,
+    Table,
+    Text,
+    as_word,
+)
 from excite_cli.shown.record import show
 
 # Measured data in words, and their runs as a table.
@@ -157,20 +169,32 @@ def counted(found: AnyInspection) -> tuple[int, int, int]:
 
 def _data(found: AnyInspection, applied: str | None) -> dict[str, Any]:
     """The answer for `--json`."""
+    own = ("name", "status", "joints", "runs", "evidence", "settings")
     return {
         "good": found.good,
-        "checks": [
-            {
-                "name": each.name,
-                "status": each.status,
-                "joints": list(each.joints),
-                "runs": each.runs,
-                "evidence": each.evidence,
-                "key": written(each.settings),
-                "settings": dict(each.settings),
-            }
-            for each in found.results
-        ],
         "settings": dict(found.settings),
         "output": applied,
+        "checks": [
+            {**data_of(each, *own), "key": written(each.settings)} for each in found.results
+        ],
     }
+
+
+def inspection_page(found: AnyInspection, title: str) -> Page:
+    """The table of all checks, the evidence of what is not fine, and what would be set."""
+    faults, doubts, _ = counted(found)
+    rows = tuple((key, written({key: value})) for key, value in found.settings.items())
+    columns = ("key", "line that inspect --apply writes")
+    cures = Table("", columns, rows, left=columns[:1], words=columns[1:])
+    sections = (
+        Section("checks", "Checks", (checks_table(found),)),
+        Section("evidence", "Evidence", tuple(remarks(found))),
+        Section("settings", "What would change in the config", (cures,) if rows else ()),
+    )
+    return Page(
+        title,
+        "Log and model: set-up checks",
+        (KeyFigure("faults", str(faults)), KeyFigure("doubts", str(doubts))),
+        tuple(section for section in sections if section.blocks),
+        (Text(headline(found), "good" if found.good else "bad"),),
+    )

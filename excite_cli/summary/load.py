@@ -2,11 +2,12 @@
 
 from typing import Any
 
+from excite_cli.fields import data_of
 from excite_cli.identification.carried_load import LoadIdentification
 from excite_cli.identification.fit_words import with_deviation
 from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
-from excite_cli.summary.cells import percent
+from excite_cli.summary.cells import findings_data, percent
 
 
 def load_answer(found: LoadIdentification) -> Answer:
@@ -65,24 +66,9 @@ def _data(found: LoadIdentification) -> dict[str, Any]:
     """The answer for `--json`."""
     return {
         "good": found.possible,
-        "link": found.link,
-        "joint": found.joint,
-        "parameters": {
-            name: {"value": each.value, "std": each.std, "unit": each.unit}
-            for name, each in found.parameters.items()
-        },
-        "values": [float(x) for x in found.values],
-        "covariance": [[float(x) for x in row] for row in found.covariance],
-        "error": {
-            "without": found.without.as_data(),
-            "with_load": found.with_load.as_data(),
-            "of_the_fit": found.fit_error,
-        },
-        "seconds": found.seconds,
-        "findings": [
-            {"kind": f.kind, "severity": f.severity, "run": f.run, "text": f.text}
-            for f in found.findings
-        ],
+        **data_of(found, "link", "joint", "parameters", "values", "covariance", "seconds"),
+        "error": {**data_of(found, "without", "with_load"), "of_the_fit": found.fit_error},
+        "findings": findings_data(found.findings),
     }
 
 

@@ -16,7 +16,8 @@ from excite_cli.excitation.progress import Status
 from excite_cli.excitation.random_baseline import RandomMotion
 from excite_cli.excitation.random_comparison import Comparison
 from excite_cli.excitation.result import Result
-from excite_cli.shown.answer import Answer, Parts, Table
+from excite_cli.fields import data_of
+from excite_cli.shown.answer import Answer, Detail, Parts, Table
 from excite_cli.shown.record import show
 from excite_cli.summary.pairs import doubts_in_words, pairs_data, pairs_in_words, worst_data
 from excite_cli.summary.problem import problem_parts
@@ -34,7 +35,7 @@ def plan_answer(
     following = planned if isinstance(planned, NextMotion) else None
     model = planned.model if isinstance(planned, NextMotion) else planned
     parts: Parts = [*result_parts(result), output]
-    data = {
+    data: dict[str, Any] = {
         "motions": [motion_data(m) for m in result.motions],
         "criterion": criterion_data(model),
         "pairs": pairs_data(model),
@@ -45,7 +46,8 @@ def plan_answer(
     if model.spec.criterion.of == "robot" and result.motions:
         judged = efficiency or (until is not None and until.efficiency is not None)
         found = invariants(model, result.stack, design_for(model) if judged else None)
-        data.update(invariants_data(found))
+        data |= data_of(found, "torque_deviation", "efficiency")
+        data["efficiency_slack"] = found.slack  # the efficiency is at most too high by exp(slack)
         parts.insert(-1, invariants_in_words(found))
         if until is not None:
             good = Ending(model).enough(found)
@@ -114,15 +116,7 @@ def invariants_in_words(found: Invariants) -> str:
     )
 
 
-def invariants_data(found: Invariants) -> dict[str, Any]:
-    """The same for `--json`; `efficiency` is at most too high by the factor exp(slack)."""
-    return {
-        "torque_deviation": found.torque_deviation,
-        "efficiency": found.efficiency,
-        "efficiency_slack": found.slack,
-    }
-
-
+_NUMBERS = ("index", "condition_number", "stacked_condition_number")
 _FINE = "stacked, finely sampled"
 
 
@@ -149,17 +143,30 @@ def _dense(motion: Motion) -> str:
     return "–" if dense is None else f"{dense:.2f}"
 
 
-def margin_table(motions: Sequence[Motion]) -> Table:
-    """The worst margin of every constraint over all motions, at controller rate."""
+def margin_table(motions: Sequence[Motion], detail: Detail = Detail.BRIEF) -> Table:
+    """The worst margin of every constraint over all motions, at controller rate.
+
+    On a page also as a share of the size of what is bounded, and whether it is proved.
+    """
     rows = []
-    for name in motions[0].margins:
-        motion = min(motions, key=lambda m: m.margins[name].margin)
+    for name in dict.fromkeys(name for motion in motions for name in motion.margins):
+        held = [motion for motion in motions if name in motion.margins]
+        motion = min(held, key=lambda each: each.margins[name].margin)
         worst = motion.margins[name]
+        states = [each.certified[name] for each in held if name in each.certified]
+        state = "–" if not states else "proved" if all(states) else "sampled"
+        verdict = (f"{100 * worst.share:.2g} %", "BROKEN" if worst.violations else state)
         figures = (f"{worst.margin:.4f}", worst.unit, worst.label, str(motion.index))
-        rows.append((name, *figures, f"{worst.time:.3f}"))
+        rows.append((name, *figures, f"{worst.time:.3f}", *(verdict if detail else ())))
     names = ("constraint", "margin", "unit", "where", "motion", "time [s]")
-    left, words = ("constraint", "unit"), ("where",)
-    return Table("Worst margins, sampled at 1 kHz", names, tuple(rows), left, words)
+    more = ("share of its size", "verdict") if detail else ()
+    return Table(
+        "Worst margins, sampled at 1 kHz",
+        (*names, *more),
+        tuple(rows),
+        left=("constraint", "unit", *more[1:]),
+        words=("where",),
+    )
 
 
 def outlook_table(outlook: dict[str, Any]) -> Table:
@@ -198,18 +205,10 @@ def motion_sentence(motion: Motion) -> str:
 
 def motion_data(motion: Motion) -> dict[str, Any]:
     """A motion for `--json`."""
+    own = (*_NUMBERS, "dense_condition_number", "improved", "status", "note", "seconds",
+           "iterations", "evaluations", "certified")  # fmt: skip
     return {
-        "index": motion.index,
-        "condition_number": motion.condition_number,
-        "stacked_condition_number": motion.stacked_condition_number,
-        "dense_condition_number": motion.dense_condition_number,
-        "improved": motion.improved,
-        "status": motion.status,
-        "note": motion.note,
-        "seconds": motion.seconds,
-        "iterations": motion.iterations,
-        "evaluations": motion.evaluations,
-        "certified": motion.certified,
+        **data_of(motion, *own),
         "doubt": motion.doubt or None,
         "margins": {name: worst_data(worst) for name, worst in motion.margins.items()},
     }
@@ -261,17 +260,9 @@ def comparison_answer(found: Comparison, output: str | None) -> Answer:
     """What `excite compare-random` answers."""
     baseline = found.baseline
     data = {
-        "random": [
-            {
-                "index": m.index,
-                "condition_number": m.condition_number,
-                "stacked_condition_number": m.stacked_condition_number,
-            }
-            for m in baseline.motions
-        ],
+        "random": [data_of(motion, *_NUMBERS) for motion in baseline.motions],
         "optimized": [motion_data(m) for m in found.result.motions],
-        "candidates": baseline.candidates,
-        "admissible": baseline.admissible,
+        **data_of(baseline, "candidates", "admissible"),
         "seconds": {"optimized": found.seconds, "random": baseline.seconds},
         "output": output,
     }
@@ -281,11 +272,12 @@ def comparison_answer(found: Comparison, output: str | None) -> Answer:
 
 def comparison_parts(found: Comparison) -> Parts:
     """The paper's Tables I and II side by side, and how long both took."""
-    return [_table(found), _comparison_in_words(found)]
+    table = pairs_of_numbers_table(found.result.motions, found.baseline.motions)
+    return [table, _comparison_in_words(found)]
 
 
-def _table(found: Comparison) -> Table:
-    optimized, random = found.result.motions, found.baseline.motions
+def pairs_of_numbers_table(optimized: Sequence[Motion], random: Sequence[RandomMotion]) -> Table:
+    """Condition numbers, own and stacked, motion by motion."""
     rows = []
     for index in range(max(len(optimized), len(random))):
         first = optimized[index] if index < len(optimized) else None

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from excite_cli.fields import data_of
 from excite_cli.robot.description import EXAMPLE_PREFIX
 from excite_cli.robot.overview import DescribedJoint, DescribedRobot, Glance
 from excite_cli.shown.answer import Answer, Parts, Table
@@ -27,11 +28,7 @@ def robots_answer(found: Sequence[Glance], names: Sequence[str]) -> Answer:
         "robots": [f"{EXAMPLE_PREFIX}{name}" for name in names],
         "details": {
             each.name: {
-                "kind": each.kind,
-                "joints": each.joints,
-                "inertias": each.inertias,
-                "visual": each.visual,
-                "collision": each.collision,
+                **data_of(each, "kind", "joints", "inertias", "visual", "collision"),
                 "also_called": list(each.others),
                 "file": str(each.path),
             }
@@ -43,19 +40,9 @@ def robots_answer(found: Sequence[Glance], names: Sequence[str]) -> Answer:
 
 def robot_answer(found: DescribedRobot) -> Answer:
     """What `excite robots NAME` answers."""
+    own = ("kind", "lower", "upper", "velocity", "effort", "links", "followers")
     data = {
-        "joints": {
-            joint.name: {
-                "kind": joint.kind,
-                "lower": joint.lower,
-                "upper": joint.upper,
-                "velocity": joint.velocity,
-                "effort": joint.effort,
-                "links": list(joint.links),
-                "followers": list(joint.followers),
-            }
-            for joint in found.joints
-        },
+        "joints": {joint.name: data_of(joint, *own) for joint in found.joints},
         "base_links": list(found.base_links),
     }
     return Answer(tuple(robot_parts(found)), data)

@@ -3,13 +3,18 @@
 from math import isfinite, isnan
 from typing import Any
 
+import numpy as np
+
 from excite_cli.diagnosis.words import place_in_words, title_of, value_in_words
+from excite_cli.fields import data_of
 from excite_cli.identification.fit_words import short_number
+from excite_cli.report.chart import Colour
+from excite_cli.report.plot import Curve, Panel, Plot
 from excite_cli.scoring.records import RunExplanation, Score, ScoredRun
 from excite_cli.scoring.thresholds import Thresholds
-from excite_cli.shown.answer import Answer, Parts, Table
+from excite_cli.shown.answer import Answer, Charts, KeyFigure, Parts, Section, Table, parts_of
 from excite_cli.shown.record import show
-from excite_cli.summary.cells import figure, percent
+from excite_cli.summary.cells import figure, findings_data, percent
 
 # Thresholds of a collision detector in words and as a table.
 
@@ -33,6 +38,7 @@ show(Thresholds, _in_words, thresholds_parts)
 
 
 _TOLD = 3  # runs in the sentence
+_COLOURS: tuple[Colour, ...] = ("blue", "vermilion", "green", "purple", "ink", "muted")
 
 
 def score_answer(found: Score) -> Answer:
@@ -42,7 +48,55 @@ def score_answer(found: Score) -> Answer:
 
 def score_parts(found: Score) -> Parts:
     """A sentence, the runs, and errors per joint."""
-    return [*sentences(found), runs_table(found), joints_table(found)]
+    return [*sentences(found), *parts_of(score_sections(found))]
+
+
+def score_sections(found: Score) -> list[Section]:
+    """Ratios over the runs, the runs with their reasons, and the joints."""
+    ratios = [Charts((_plot(found),))] if found.made is not None and len(found.runs) > 1 else []
+    every = [
+        Section("ratios", "Residual over the runs", tuple(ratios)),
+        Section("runs", "Runs", (runs_table(found),)),
+        Section("joints", "Joints", (joints_table(found),)),
+    ]
+    return [section for section in every if section.blocks]
+
+
+def score_figures(score: Score) -> tuple[KeyFigure, ...]:
+    """What sums a score up."""
+    made = "" if score.made is None else f"{score.made.mean_relative_moving:.2%} when it was made"
+    return (
+        KeyFigure("error on these runs, moving", f"{score.error.mean_relative_moving:.2%}", made),
+        KeyFigure(
+            "runs beyond the model's tolerance",
+            f"{len(score.alarms)} of {len(score.runs)}",
+            "tolerance: residual of the model on its own data, in proportion to the torque",
+        ),
+    )
+
+
+def _plot(score: Score) -> Plot:
+    count = len(score.runs)
+    series = tuple(
+        Curve(
+            joint,
+            np.array([run.ratio.get(joint, np.nan) for run in score.runs]),
+            _COLOURS[k % len(_COLOURS)],
+            "joined",
+        )
+        for k, joint in enumerate(score.joint_names)
+    )
+    alarms = ", ".join(run.name for run in score.alarms) or "none"
+    return Plot(
+        "RMS of the residual over the model's tolerance",
+        f"Ratio of every joint over {count} runs; alarms: {alarms}.",
+        "run",
+        np.arange(1.0, count + 1.0),
+        (Panel("ratio", series, height=240),),
+        caption="1: as on the day the model was made. Runs are numbered as in the table.",
+        wide=True,
+        counted=True,
+    )
 
 
 def sentences(found: Score) -> list[str]:
@@ -177,50 +231,26 @@ def score_data(found: Score) -> dict[str, Any]:
     return {
         "good": not found.alarms,
         "answer": sentences(found),
-        "model": found.model,
+        **data_of(found, "model", "error", "made", "noise"),
+        "findings": findings_data(found.findings),
         "runs": [_run_data(run, found) for run in found.runs],
-        "error": found.error.as_data(),
-        "made": None if found.made is None else found.made.as_data(),
-        "noise": found.noise,
-        "findings": [
-            {"kind": f.kind, "severity": f.severity, "run": f.run, "text": f.text}
-            for f in found.findings
-        ],
     }
 
 
 def _run_data(run: ScoredRun, found: Score) -> dict[str, Any]:
+    own = ("name", "file", "seconds", "allowed", "ratio", "peak", "alarm", "judged", "covariates")
     return {
-        "name": run.name,
-        "file": run.file,
-        "seconds": run.seconds,
-        "relative_moving": run.error.relative_moving,
-        "relative": run.error.relative,
-        "rms": run.error.rms,
-        "samples": run.error.samples,
-        "allowed": run.allowed,
-        "ratio": run.ratio,
-        "peak": run.peak,
-        "alarm": run.alarm,
-        "judged": list(run.judged),
+        **data_of(run, *own, "epoch"),
+        **data_of(run.error, "relative_moving", "relative", "rms", "samples"),
         "joints": list(run.left),
         "reasons": [
             {
-                "kind": each.effect.kind,
-                "joints": list(each.effect.joints),
-                "shape": each.effect.shape,
-                "values": list(each.effect.values),
-                "parameters": {
-                    name: {"value": p.value, "std": p.std, "unit": p.unit}
-                    for name, p in each.parameters.items()
-                },
-                "share": each.share,
+                **data_of(each.effect, "kind", "joints", "shape", "values"),
+                **data_of(each, "parameters", "share"),
             }
             for each in run.reasons
         ],
         "in_words": in_words(run, found),
-        "covariates": run.covariates,
-        "epoch": run.epoch,
     }
 
 

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from excite_cli.fields import data_of
 from excite_cli.scoring.records import Replay
 from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
@@ -62,12 +63,8 @@ def _data(found: Replay) -> dict[str, Any]:
         "good": found.good,
         "answer": _replay_in_words(found),
         "runs": list(found.names),
-        "seconds": found.seconds,
-        "before": found.before,
-        "after": found.after,
         "mean": {"before": before, "after": after},
-        "lost": list(found.lost),
-        "notes": list(found.notes),
+        **data_of(found, "seconds", "before", "after", "lost", "notes"),
     }
 
 

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from excite_cli.report.dependence_section import share_map
+from excite_cli.report.dependence_chart import share_map
 
 CELL = re.compile(
     r'<rect x="([\d.]+)" y="([\d.]+)" width="([\d.]+)" height="[\d.]+" '

@@ -1,4 +1,4 @@
-"""What is still unexplained: on which quantities the rest depends, as a map and as pictures."""
+"""On which quantities the residual depends, as a map and as pictures."""
 
 from collections.abc import Sequence
 from html import escape
@@ -8,12 +8,12 @@ import numpy as np
 from excite_cli.diagnosis.covariate import Aspect, Covariate
 from excite_cli.diagnosis.records import Diagnosis, ExcessResidual
 from excite_cli.diagnosis.traces import Dependence, Traces
-from excite_cli.diagnosis.words import covariate_in_words, rests_in_words
+from excite_cli.diagnosis.words import covariate_in_words
 from excite_cli.report.chart import Chart, Colour, limits_about
-from excite_cli.report.page import Block, Charts, PageSection, Text
 from excite_cli.report.plot import Curve, Panel, Plot, merged
-from excite_cli.report.residual_section import readable_unit
+from excite_cli.report.residual_chart import readable_unit
 from excite_cli.robot.model import Array
+from excite_cli.shown.answer import Block, Charts, Text
 
 # Shares in a grid: the larger, the darker, with the figure in each cell, as SVG.
 
@@ -79,40 +79,18 @@ _UNITS = {"position": "rad", "speed": "rad/s", "acceleration": "rad/s²", "load"
 _SERIES = {"position": "q", "speed": "v", "acceleration": "a", "load": "load", "time": "t"}
 
 
-def dependence_section(found: Diagnosis) -> PageSection:
-    """Sentences, the map, and what is left over what it depends on most."""
-    more, perhaps = rests_in_words(found, covariate_in_words)
-    sentences: list[Block] = [Text(text, "bad") for text in more]
-    sentences += [Text(text) for text in perhaps]
-    if not sentences:
-        sentences.append(
-            Text(
-                "The residual depends significantly on no quantity: the residual "
-                "behaves like noise.",
-                "good",
-            )
-        )
-    blocks = sentences
-    if found.traces is not None:
-        pictures = [
-            chart
-            for each in found.unexplained
-            for covariate in each.depends_on
-            for chart in _picture(found, found.traces, each, covariate)
-        ]
-        if pictures:
-            blocks.append(
-                Charts(
-                    tuple(pictures), "Residual over the quantities on which the residual depends"
-                )
-            )
-        blocks.append(_map(found.traces.dependence))
-    lead = (
-        "After all effects are in, is what remains of the torque still a function of something? "
-        "Every joint's residual is tried against time, angles, speeds and accelerations of all "
-        "joints, and its own load, direction and history."
+def dependence_blocks(found: Diagnosis) -> list[Block]:
+    """What is left over what it depends on most, and the map."""
+    if found.traces is None:
+        return []
+    pictures = tuple(
+        chart
+        for each in found.unexplained
+        for covariate in each.depends_on
+        for chart in _picture(found, found.traces, each, covariate)
     )
-    return PageSection("diagnosis-unexplained", "Unexplained residual", tuple(blocks), lead)
+    title = "Residual over the quantities on which the residual depends"
+    return [*([Charts(pictures, title)] if pictures else []), _map(found.traces.dependence)]
 
 
 def _map(dependence: Dependence) -> Block:
@@ -129,7 +107,7 @@ def _map(dependence: Dependence) -> Block:
         f"the residual of some joint, at most {most[rows[0]]:.0%}: "
         f"{covariate_in_words(dependence.quantities[rows[0]])} for {dependence.joints[j]}."
     )
-    return share_map(
+    chart = share_map(
         "Share of the residual that one quantity explains [%]",
         words,
         [covariate_in_words(dependence.quantities[k]) for k in rows],
@@ -139,6 +117,7 @@ def _map(dependence: Dependence) -> Block:
         "Columns: the joint of the residual. Shares are cross-validated over runs; shares overlap, "
         "since quantities of one motion correlate. The sentences above name the significant ones.",
     )
+    return Charts((chart,))
 
 
 def _picture(

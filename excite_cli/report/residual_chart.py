@@ -8,9 +8,9 @@ import numpy as np
 
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.report.chart import thinned
-from excite_cli.report.page import Block, Charts, ChoiceBlock, Text
 from excite_cli.report.plot import Curve, Panel, Plot
 from excite_cli.robot.model import Array
+from excite_cli.shown.answer import Block, Charts, Choice
 
 # Units in which small and large torques read well.
 
@@ -39,18 +39,13 @@ def residuals_in_time(
     traces: Sequence[TorqueTrace], joint_names: Sequence[str], units: Sequence[str]
 ) -> tuple[Block, ...]:
     """A card per joint, a choice of runs; parts that took no part in the fit are shaded."""
-    if not traces:
-        return (
-            Text(
-                "The file holds no torque over time: it was written by an earlier version. Run "
-                "the command again to have it."
-            ),
-        )
     options = tuple(
         (label, (Charts(charts),))
         for label, charts in plots_in_time(traces, joint_names, units).items()
     )
-    return options[0][1] if len(options) == 1 else (ChoiceBlock("Run", options),)
+    if len(options) < 2:
+        return options[0][1] if options else ()
+    return (Choice("Run", options),)
 
 
 def plots_in_time(
