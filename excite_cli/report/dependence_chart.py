@@ -1,123 +1,30 @@
-"""On which quantities the residual depends, as a map and as pictures."""
-
-from collections.abc import Sequence
-from html import escape
+"""The residual over the quantities on which it depends."""
 
 import numpy as np
 
 from excite_cli.diagnosis.covariate import Aspect, Covariate
 from excite_cli.diagnosis.records import Diagnosis, ExcessResidual
-from excite_cli.diagnosis.traces import Dependence, Traces
+from excite_cli.diagnosis.traces import Traces
 from excite_cli.diagnosis.words import covariate_in_words
-from excite_cli.report.chart import Chart, Colour, limits_about
+from excite_cli.report.chart import Colour, limits_about
 from excite_cli.report.plot import Curve, Panel, Plot, merged
 from excite_cli.report.residual_chart import readable_unit
 from excite_cli.robot.model import Array
-from excite_cli.shown.answer import Block, Charts, Text
 
-# Shares in a grid: the larger, the darker, with the figure in each cell, as SVG.
-
-_WIDTH, _WIDE = 284.0, 583.0  # pt
-_ROW, _LETTER, _MOST_NAME, _EDGE = 15.0, 4.5, 130.0, 4.0  # pt
-_SLOPE = np.radians(40.0)
-
-
-def share_map(
-    title: str,
-    alternative: str,
-    rows: Sequence[str],
-    columns: Sequence[str],
-    shares: Array,
-    least: float,
-    caption: str = "",
-) -> Chart:
-    """`shares` (rows, columns), from 0 to 1; cells below `least` are empty."""
-    wide = len(columns) > 6
-    width = _WIDE if wide else _WIDTH
-    left = min(_MOST_NAME, _LETTER * max(map(len, rows)) + _EDGE)
-    cell = (width - left - _EDGE) / len(columns)
-    bottom = _EDGE + _ROW * len(rows)
-    # Names of columns lean; the first must not leave the drawing on the left.
-    room = min(_LETTER * max(map(len, columns)), (left + cell / 2) / np.cos(_SLOPE))
-    height = bottom + 10.0 + room * np.sin(_SLOPE)
-    parts = [f'<svg viewBox="0 0 {width:g} {height:.0f}">']
-    for y, name in enumerate(rows):
-        parts.append(_text(left - 4, _EDGE + _ROW * (y + 0.5) + 3, name, "end", left - 4))
-        for x, share in enumerate(shares[y]):
-            if not share >= least:  # nor what is not known
-                continue
-            opacity = 0.08 + 0.5 * float(np.sqrt(share))
-            parts.append(
-                f'<rect x="{left + cell * x + 1:.1f}" y="{_EDGE + _ROW * y + 1:.1f}" '
-                f'width="{cell - 2:.1f}" height="{_ROW - 2:.1f}" '
-                f'style="fill: var(--blue); opacity: {opacity:.2f}"></rect>'
-            )
-            middle = left + cell * (x + 0.5)
-            figure = f"{100 * share:.0f}"
-            parts.append(_text(middle, _EDGE + _ROW * (y + 0.5) + 3, figure, "middle", cell))
-    for x, name in enumerate(columns):
-        middle = left + cell * (x + 0.5)
-        turn = f' transform="rotate(-40 {middle:.1f} {bottom + 8:.1f})"'
-        parts.append(_text(middle, bottom + 8, name, "end", room, turn))
-    return Chart(title, "".join([*parts, "</svg>"]), alternative, caption, wide)
-
-
-def _text(x: float, y: float, text: str, anchor: str, room: float, turn: str = "") -> str:
-    fits = _LETTER * len(text) <= room + 1.0
-    narrow = "" if fits else f' textLength="{room:.0f}" lengthAdjust="spacingAndGlyphs"'
-    return (
-        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}"{narrow}{turn} '
-        f'style="font-size: 8.5px; fill: var(--ink)">{escape(text)}</text>'
-    )
-
-
-_SHOWN = 0.01  # share from which on a quantity gets a line of the map
-_MOST_ROWS = 18
 _MOST_DOTS = 400
 _UNITS = {"position": "rad", "speed": "rad/s", "acceleration": "rad/s²", "load": "N·m", "time": "s"}
 # Where a trace has it.
 _SERIES = {"position": "q", "speed": "v", "acceleration": "a", "load": "load", "time": "t"}
 
 
-def dependence_blocks(found: Diagnosis) -> list[Block]:
-    """What is left over what it depends on most, and the map."""
-    if found.traces is None:
-        return []
-    pictures = tuple(
+def dependence_plots(found: Diagnosis, traces: Traces) -> tuple[Plot, ...]:
+    """What is left over what it depends on most."""
+    return tuple(
         chart
         for each in found.unexplained
         for covariate in each.depends_on
-        for chart in _picture(found, found.traces, each, covariate)
+        for chart in _picture(found, traces, each, covariate)
     )
-    title = "Residual over the quantities on which the residual depends"
-    return [*([Charts(pictures, title)] if pictures else []), _map(found.traces.dependence)]
-
-
-def _map(dependence: Dependence) -> Block:
-    most = dependence.shares.max(axis=0)
-    rows = [int(k) for k in np.argsort(-most, kind="stable")[:_MOST_ROWS] if most[k] >= _SHOWN]
-    if not rows:
-        return Text(
-            f"No smooth function of a single quantity predicts {_SHOWN:.0%} or more of the "
-            "residual of any joint that runs left out confirm."
-        )
-    j = int(np.argmax(dependence.shares[:, rows[0]]))
-    words = (
-        f"Of {len(dependence.quantities)} quantities, {len(rows)} explain {_SHOWN:.0%} or more of "
-        f"the residual of some joint, at most {most[rows[0]]:.0%}: "
-        f"{covariate_in_words(dependence.quantities[rows[0]])} for {dependence.joints[j]}."
-    )
-    chart = share_map(
-        "Share of the residual that one quantity explains [%]",
-        words,
-        [covariate_in_words(dependence.quantities[k]) for k in rows],
-        dependence.joints,
-        dependence.shares[:, rows].T,
-        _SHOWN / 2,
-        "Columns: the joint of the residual. Shares are cross-validated over runs; shares overlap, "
-        "since quantities of one motion correlate. The sentences above name the significant ones.",
-    )
-    return Charts((chart,))
 
 
 def _picture(

@@ -126,18 +126,12 @@ def peaks_table(problem: Problem, signals: Signals) -> Table:
     for joint, name in enumerate(problem.robot.joint_names):
         q, unit = signals.values[0, :, joint], signals.units[joint][0]
         limits = f"{_bound(signals.lower[0, joint])} … {_bound(signals.upper[0, joint])}"
-        rows.append(
-            (
-                name,
-                f"{in_figures(float(q.min()))} … {in_figures(float(q.max()))} {unit}",
-                limits,
-                *(_peak(signals, order, joint) for order in (1, 2, 3)),
-            )
-        )
-    return Table(
+        peaks = {f"peak {_WORDS[order]}": _peak(signals, order, joint) for order in (1, 2, 3)}
+        position = f"{in_figures(float(q.min()))} … {in_figures(float(q.max()))} {unit}"
+        rows.append({"joint": name, "position": position, "limits": limits, **peaks})
+    return Table.of(
         "Ranges and peaks of every joint",
-        ("joint", "position", "limits", "peak speed", "peak acceleration", "peak torque"),
-        tuple(rows),
+        rows,
         left=("joint",),
         note="In brackets the share of the limit. Torques are those of the URDF's inertias.",
         folded=True,

@@ -5,10 +5,10 @@ nothing else. A terminal and a notebook show no charts.
 """
 
 import shlex
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from typing import Any
+from typing import Any, Self
 
 
 class Detail(IntEnum):
@@ -44,7 +44,8 @@ class Table:
     `left`: columns of names and units, `words`: columns that may wrap where there is little room;
     all others hold figures and are aligned to the right. `bold`: rows by their number. Before the
     rows of `parted` there is a gap. `note` explains columns; where a page is shown, a table that is
-    `folded` has to be opened.
+    `folded` has to be opened. `shades`: how dark the cells of each row after the first are there,
+    from 0 to 1.
     """
 
     title: str
@@ -56,6 +57,7 @@ class Table:
     parted: tuple[int, ...] = ()
     note: str = ""
     folded: bool = False
+    shades: tuple[tuple[float, ...], ...] = ()
 
     def __post_init__(self) -> None:
         """Raise ValueError for a row of another length than the columns, or an unknown column."""
@@ -64,6 +66,27 @@ class Table:
         unknown = {*self.left, *self.words} - {*self.columns}
         if unknown:
             raise ValueError(f"'{self.title}' has no columns {sorted(unknown)}")
+
+    @classmethod
+    def of(
+        cls,
+        title: str,
+        rows: Iterable[Mapping[str, str]],
+        left: tuple[str, ...] = (),
+        words: tuple[str, ...] = (),
+        **look: Any,
+    ) -> Self:
+        """A table of rows that have each cell beside the name of its column; others are empty.
+
+        Names in `left` and `words` may be those of columns that are not there.
+        """
+        cells = list(rows)
+        columns = tuple(dict.fromkeys(name for row in cells for name in row))
+        texts = tuple(tuple(row.get(name, "") for name in columns) for row in cells)
+        own_left, own_words = (
+            tuple(name for name in names if name in columns) for names in (left, words)
+        )
+        return cls(title, columns, texts, own_left, own_words, **look)
 
     def is_left(self, column: str) -> bool:
         """Whether the cells of a column are aligned to the left."""

@@ -27,45 +27,25 @@ def round_in_words(number: int, learned: RoundFindings) -> str:
 
 def rounds_table(campaign: Campaign) -> Table:
     """A row per round; seconds of motion add up to those of the campaign."""
-    return Table(
-        "Rounds (errors: of the torque on the newest motion, which is held out)",
-        (
-            "round",
-            "motions",
-            "pace",
-            "seconds",
-            "efficiency",
-            "before",
-            "after",
-            "torque std [σ]",
-            "effects",
-        ),
-        tuple(_row(each) for each in campaign.rounds),
-        words=("effects",),
-    )
+    title = "Rounds (errors: of the torque on the newest motion, which is held out)"
+    return Table.of(title, map(_row, campaign.rounds), words=("effects",))
 
 
-def _row(each: CampaignRound) -> tuple[str, ...]:
+def _row(each: CampaignRound) -> dict[str, str]:
     learned = each.learned
-    pace = f"{min(m.pace for m in each.motions):.0%}"
-    seconds = f"{sum(m.seconds for m in each.motions if m.data):.0f}"
-    measured = sum(bool(m.data) for m in each.motions)
-    count = str(measured) if measured == len(each.motions) else f"{measured} of {len(each.motions)}"
-    efficiency = "" if each.efficiency is None else f"{each.efficiency:.2%}"
-    if learned is None:
-        return str(each.number), count, pace, seconds, efficiency, *[""] * 4
-    known = learned.torque_deviation
-    return (
-        str(each.number),
-        count,
-        pace,
-        seconds,
-        efficiency,
-        f"{learned.before:.2%}",
-        f"{learned.after:.2%}",
-        "" if known is None else f"{known:.2g}",
-        ", ".join(learned.effects),
-    )
+    measured, every = sum(bool(m.data) for m in each.motions), len(each.motions)
+    known = learned and learned.torque_deviation
+    return {
+        "round": str(each.number),
+        "motions": str(measured) if measured == every else f"{measured} of {every}",
+        "pace": f"{min(m.pace for m in each.motions):.0%}",
+        "seconds": f"{sum(m.seconds for m in each.motions if m.data):.0f}",
+        "efficiency": "" if each.efficiency is None else f"{each.efficiency:.2%}",
+        "before": f"{learned.before:.2%}" if learned else "",
+        "after": f"{learned.after:.2%}" if learned else "",
+        "torque std [σ]": "" if known is None else f"{known:.2g}",
+        "effects": ", ".join(learned.effects) if learned else "",
+    }
 
 
 def campaign_answer(campaign: Campaign, folder: Path, written: dict[str, str]) -> Answer:
@@ -178,20 +158,19 @@ def _open(last: CampaignRound) -> Section:
 
 
 def _motions(campaign: Campaign) -> Section:
-    rows = tuple(
-        (
-            each.name,
-            each.purpose,
-            f"{each.pace:.0%}",
-            f"{each.seconds:.1f}" if each.data else "",
-            each.data or "not measured yet",
-            "; ".join(each.rejected),
-        )
+    rows = (
+        {
+            "motion": each.name,
+            "for": each.purpose,
+            "pace": f"{each.pace:.0%}",
+            "seconds": f"{each.seconds:.1f}" if each.data else "",
+            "log": each.data or "not measured yet",
+            "rejected recordings": "; ".join(each.rejected),
+        }
         for one in campaign.rounds
         for each in one.motions
     )
-    columns = ("motion", "for", "pace", "seconds", "log", "rejected recordings")
-    table = Table("", columns, rows, left=("motion", "for", "log"), words=columns[-1:])
+    table = Table.of("", rows, left=("motion", "for", "log"), words=("rejected recordings",))
     return Section("motions", "Motions", (table,))
 
 

@@ -43,21 +43,20 @@ def changes_table(found: Changes) -> Table:
 
 
 def _table(shown: Sequence[Change]) -> Table:
-    rows = tuple(
-        (
-            change.name,
-            f"{change.before:.4g}" if abs(change.before) > 1e-9 * change.std else "0",
-            with_deviation(change.after, change.std),
-            change.unit,
-            change.since,
-            p_in_words(change.p_value, _LEAST_P) if change.p_value < 0.995 else "1",
-            "CHANGED" if change.significant else "",
-        )
+    rows = (
+        {
+            "parameter": change.name,
+            "before": f"{change.before:.4g}" if abs(change.before) > 1e-9 * change.std else "0",
+            "after": with_deviation(change.after, change.std),
+            "unit": change.unit,
+            "since": change.since,
+            "p": p_in_words(change.p_value, _LEAST_P) if change.p_value < 0.995 else "1",
+            "verdict": "CHANGED" if change.significant else "",
+        }
         for change in shown
     )
-    return Table(
+    return Table.of(
         "Changes (± std of the change; p corrected for the number of parameters and data sets)",
-        ("parameter", "before", "after", "unit", "since", "p", "verdict"),
         rows,
         left=("parameter", "unit", "since", "verdict"),
         bold=tuple(k for k, change in enumerate(shown) if change.significant),

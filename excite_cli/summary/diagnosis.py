@@ -4,23 +4,27 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from excite_cli.diagnosis.answer_words import answer_in_words
 from excite_cli.diagnosis.next_motion import next_command, next_experiment
 from excite_cli.diagnosis.records import Diagnosis, EffectRecord, NamedEffect, Round
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.diagnosis.words import (
     counted,
+    covariate_in_words,
     no_gain_in_words,
     p_in_words,
     place_in_words,
     rests_in_words,
     value_in_words,
 )
-from excite_cli.report.dependence_chart import dependence_blocks
+from excite_cli.report.dependence_chart import dependence_plots
 from excite_cli.report.residual_chart import residuals_in_time
 from excite_cli.shown.answer import (
     Answer,
     Block,
+    Charts,
     Command,
     Detail,
     Fold,
@@ -45,6 +49,8 @@ from excite_cli.summary.named_effects import (
     what_and_where,
 )
 
+_WORTH = 0.01  # share of the residual from which on a quantity is told
+_MOST_QUANTITIES = 18
 _OPEN_ROUNDS = 3  # tables of rounds that a page shows without being opened
 
 
@@ -144,13 +150,51 @@ def _unexplained_section(found: Diagnosis, detail: Detail) -> Section:
         if not blocks:
             none = "The residual depends significantly on no quantity: it behaves like noise."
             blocks.append(Text(none, "good"))
-        blocks += dependence_blocks(found)
+        blocks += _dependences(found)
     lead = (
         "After all effects are in, is what remains of the torque still a function of something? "
         "Every joint's residual is tried against time, angles, speeds and accelerations of all "
         "joints, and its own load, direction and history."
     )
     return Section("diagnosis-unexplained", "Unexplained residual", tuple(blocks), lead)
+
+
+def _dependences(found: Diagnosis) -> list[Block]:
+    """What is left over what it depends on most, and the share that each quantity explains."""
+    if found.traces is None:
+        return []
+    dependence = found.traces.dependence
+    most = dependence.shares.max(axis=0)
+    kept = [
+        int(k) for k in np.argsort(-most, kind="stable")[:_MOST_QUANTITIES] if most[k] >= _WORTH
+    ]
+    shares = dependence.shares[:, kept].T
+    rows = (
+        {
+            "quantity": covariate_in_words(dependence.quantities[k]),
+            **{
+                joint: f"{100 * share:.0f}" if share >= _WORTH / 2 else ""
+                for joint, share in zip(dependence.joints, own, strict=True)
+            },
+        }
+        for k, own in zip(kept, shares, strict=True)
+    )
+    table = Table.of(
+        "Share of the residual that one quantity explains [%]",
+        rows,
+        left=("quantity",),
+        note="Columns: the joint of the residual. Shares are cross-validated over runs; shares "
+        "overlap, since quantities of one motion correlate. The sentences above name the "
+        "significant ones.",
+        shades=tuple(map(tuple, shares.tolist())),
+    )
+    none = (
+        f"No smooth function of a single quantity predicts {_WORTH:.0%} or more of the residual of "
+        "any joint that runs left out confirm."
+    )
+    pictures = dependence_plots(found, found.traces)
+    title = "Residual over the quantities on which the residual depends"
+    return [*([Charts(pictures, title)] if pictures else []), table if kept else none]
 
 
 def _candidates_section(found: Diagnosis, detail: Detail) -> Section:
@@ -175,21 +219,20 @@ def _candidates_section(found: Diagnosis, detail: Detail) -> Section:
 def _round_table(found: Diagnosis, each: Round) -> Table:
     worst = max(each.residual, key=lambda joint: each.residual[joint])
     unit = dict(zip(found.joint_names, found.torque_units, strict=True)).get(worst, "")
-    rows = tuple(
-        (
-            suspect.effect.kind,
-            place_in_words(suspect.effect, len(found.joint_names)),
-            p_in_words(suspect.p_value, suspect.least_p),
-            f"{suspect.share_of_residual:.1%}",
-            f"{suspect.gain:.1%}",
-            f"{suspect.verdict}: {suspect.why}" if suspect.why else suspect.verdict,
-        )
+    rows = (
+        {
+            "candidate": suspect.effect.kind,
+            "where": place_in_words(suspect.effect, len(found.joint_names)),
+            "p": p_in_words(suspect.p_value, suspect.least_p),
+            "of residual": f"{suspect.share_of_residual:.1%}",
+            "gain on data left out": f"{suspect.gain:.1%}",
+            "verdict": f"{suspect.verdict}: {suspect.why}" if suspect.why else suspect.verdict,
+        }
         for suspect in each.suspects
     )
-    return Table(
+    return Table.of(
         f"Round {each.index}: largest residual {each.residual[worst]:.3g} {unit} RMS ({worst}); "
         f"{each.verdict} (p: of it alone; sets are judged together)",
-        ("candidate", "where", "p", "of residual", "gain on data left out", "verdict"),
         rows,
         words=("candidate", "where", "verdict"),
         bold=tuple(k for k, each in enumerate(each.suspects) if each.verdict is Verdict.ACCEPTED),

@@ -1,7 +1,7 @@
 """Errors of every joint on held-out data: of the URDF, refitted, with effects; who took it off."""
 
 from collections.abc import Iterator
-from math import isnan
+from math import isnan, nan
 
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.diagnosis.words import assumption_in_words, counted, ends_in_words
@@ -11,7 +11,7 @@ from excite_cli.report.chart import Chart
 from excite_cli.report.error_chart import DECLARED_AND_FOUND, NOTHING_MOVES, error_charts
 from excite_cli.report.robot_chart import robot_chart
 from excite_cli.shown.answer import Block, Charts, Detail, Section, Table
-from excite_cli.summary.cells import figure, floor_cells, floor_columns, percent
+from excite_cli.summary.cells import figure, percent
 from excite_cli.summary.named_effects import what_and_where
 
 _OFF = "change by effect (pp)"
@@ -72,32 +72,37 @@ def error_tables(found: Diagnosis, detail: Detail) -> list[Table]:
 
 
 def _moving(found: Diagnosis) -> Table:
-    errors = _errors(found)
-    rows = [
-        (
-            joint,
-            *(percent(each.relative_moving[joint]) for each in errors.values()),
-            *(figure(_rms(each)[joint]) for each in (found.before, found.after)),
-            unit,
-            *floor_cells(found.noise_floor, joint),
-            *([_taken_off(found, joint)] if _has_parts(found) else []),
-        )
-        for joint, unit in _joints(found)
-    ]
-    off = [_OFF] if _has_parts(found) else []
-    floor = floor_columns(found.noise_floor)
-    mean = ("mean", *(percent(each.mean_relative_moving) for each in errors.values()))
-    mean += ("",) * (3 + len(floor) + len(off))
-    return Table(
+    rows = []
+    for joint, unit in _joints(found):
+        row = _row(found, joint, unit, moving=True)
+        if found.noise_floor is not None:
+            row["noise floor"] = figure(found.noise_floor.get(joint, nan))
+        if _has_parts(found):
+            row[_OFF] = _taken_off(found, joint)
+        rows.append(row)
+    errors = {name: percent(each.mean_relative_moving) for name, each in _errors(found).items()}
+    title = (
         f"Error of the torque on held-out data ({found.held_out_run}), where joints move "
-        f"({_columns_in_words(found)})",
-        ("joint", *errors, "RMS declared", "RMS with effects", "unit", *floor, *off),
-        (*rows, mean),
-        left=("joint", "unit"),
-        words=tuple(off),
-        bold=(len(rows),),
-        parted=(len(rows),),
+        f"({_columns_in_words(found)})"
     )
+    return _with_mean(title, rows, errors)
+
+
+def _with_mean(title: str, rows: list[dict[str, str]], means: dict[str, str]) -> Table:
+    last = (len(rows),)
+    every = [*rows, {"joint": "mean", **means}]
+    return Table.of(title, every, ("joint", "unit"), words=(_OFF,), bold=last, parted=last)
+
+
+def _row(found: Diagnosis, joint: str, unit: str, moving: bool) -> dict[str, str]:
+    errors = {
+        name: percent((each.relative_moving if moving else each.relative)[joint])
+        for name, each in _errors(found).items()
+    }
+    before, after = ((_rms(each) if moving else each.rms) for each in (found.before, found.after))
+    rms = {"RMS declared": figure(before[joint]), "RMS with effects": figure(after[joint])}
+    raw = {} if moving else {"RMS unfiltered": figure(found.after.rms_raw[joint])}
+    return {"joint": joint, **errors, **rms, **raw, "unit": unit}
 
 
 def _columns_in_words(found: Diagnosis) -> str:
@@ -126,7 +131,7 @@ def _joints(found: Diagnosis) -> Iterator[tuple[str, str]]:
 
 
 def _rms(error: Errors) -> dict[str, float]:
-    """Where joints move; files of earlier versions know it over all samples only."""
+    """Where joints move; over all samples where that is not known."""
     return error.rms_moving or error.rms
 
 
@@ -203,20 +208,10 @@ def _parts(found: Diagnosis) -> Table:
 
 
 def _all_samples(found: Diagnosis) -> Table:
-    errors = _errors(found)
-    rows = [
-        (joint, *(percent(each.relative[joint]) for each in errors.values()),
-         *(figure(each.rms[joint]) for each in (found.before, found.after)),
-         figure(found.after.rms_raw[joint]), unit)
-        for joint, unit in _joints(found)
-    ]  # fmt: skip
-    mean = ("mean", *(percent(each.mean_relative) for each in errors.values()), "", "", "", "")
-    return Table(
+    rows = [_row(found, joint, unit, moving=False) for joint, unit in _joints(found)]
+    title = (
         f"Over all samples of {found.held_out_run}, including joints at rest (unfiltered: with "
-        "effects, the torque as recorded)",
-        ("joint", *errors, "RMS declared", "RMS with effects", "RMS unfiltered", "unit"),
-        (*rows, mean),
-        left=("joint", "unit"),
-        bold=(len(rows),),
-        parted=(len(rows),),
+        "effects, the torque as recorded)"
     )
+    errors = {name: percent(each.mean_relative) for name, each in _errors(found).items()}
+    return _with_mean(title, rows, errors)

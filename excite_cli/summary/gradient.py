@@ -47,22 +47,24 @@ def gradient_parts(found: GradientCheck) -> Parts:
 
 
 def _errors(found: GradientCheck) -> Table:
-    rows = tuple(
-        (words, f"{found.relative_error[key]:.1e}", allowed)
+    rows = (
+        {"pair": words, "error": f"{found.relative_error[key]:.1e}", "allowed": allowed}
         for key, (words, allowed) in _PAIRS.items()
     )
-    return Table("Relative error of the gradient", ("pair", "error", "allowed"), rows, ("pair",))
+    return Table.of("Relative error of the gradient", rows, left=("pair",))
 
 
 def _times(found: GradientCheck) -> Table:
     forward = found.seconds["forward"]
-    rows = tuple(
-        (words, f"{1e3 * found.seconds[key]:.2f}", f"{forward / found.seconds[key]:.3g} ×")
+    rows = (
+        {
+            "computation": words,
+            "ms": f"{1e3 * found.seconds[key]:.2f}",
+            "faster than forward differences": f"{forward / found.seconds[key]:.3g} ×",
+        }
         for key, words in _TIMES.items()
     )
-    return Table(
-        "Time", ("computation", "ms", "faster than forward differences"), rows, ("computation",)
-    )
+    return Table.of("Time", rows, left=("computation",))
 
 
 def _verdict(found: GradientCheck) -> str:

@@ -1,8 +1,7 @@
 """What `excite identify` found, as tables and as data."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from math import isnan
+from math import isnan, nan
 from pathlib import Path
 from typing import Any
 
@@ -41,8 +40,6 @@ from excite_cli.summary.cells import (
     figure,
     files_in_words,
     findings_data,
-    floor_cells,
-    floor_columns,
     percent,
 )
 from excite_cli.summary.findings import data_blocks
@@ -53,15 +50,6 @@ _CORRELATED, _MOST_PAIRS = 0.95, 15
 
 _TITLE = (
     "Links deviating from the URDF (± one standard deviation; centre of mass in the link's frame)"
-)
-_COLUMNS = (
-    "link",
-    "mass [kg]",
-    "URDF mass [kg]",
-    "centre x, y, z [mm]",
-    "URDF centre [mm]",
-    "determined by data",
-    "physically infeasible",
 )
 
 
@@ -75,16 +63,9 @@ def link_parts(links: Sequence[LinkChange]) -> Parts:
         f"{others} {'other ' if shown else ''}link{'s' * (others != 1)} of {len(links)}: mass and "
         "centre within two standard deviations of the URDF's."
     )
-    rows = tuple(_row(link) for link in shown)
-    left = ("link", "determined by data", "physically infeasible")
-    return [
-        *(
-            [Table(_TITLE, _COLUMNS, rows, left=left, words=("physically infeasible",))]
-            if rows
-            else []
-        ),
-        *([counted] if others else []),
-    ]
+    left = ("link", "determined by data")
+    table = Table.of(_TITLE, map(_row, shown), left, words=("physically infeasible",))
+    return [*([table] if shown else []), *([counted] if others else [])]
 
 
 def link_data(links: Sequence[LinkChange]) -> list[dict[str, Any]]:
@@ -102,22 +83,20 @@ def link_data(links: Sequence[LinkChange]) -> list[dict[str, Any]]:
     ]
 
 
-def _row(link: LinkChange) -> tuple[str, ...]:
+def _row(link: LinkChange) -> dict[str, str]:
     """A line per axis in the cells of the centre."""
-    known = [
-        name
-        for name, change in zip(("mass", "x", "y", "z"), (link.mass, *link.center), strict=True)
-        if change.determined
-    ]
-    return (
-        link.link,
-        with_deviation(link.mass.after, link.mass.std),
-        f"{link.mass.before:.4g}",
-        "\n".join(with_deviation(1e3 * c.after, 1e3 * c.std) for c in link.center),
-        "\n".join(f"{1e3 * c.before:.4g}" for c in link.center),
-        ", ".join(known) or "nothing",
-        "; ".join(link.marks),
-    )
+    changes = zip(("mass", "x", "y", "z"), (link.mass, *link.center), strict=True)
+    known = [name for name, change in changes if change.determined]
+    center = (with_deviation(1e3 * each.after, 1e3 * each.std) for each in link.center)
+    return {
+        "link": link.link,
+        "mass [kg]": with_deviation(link.mass.after, link.mass.std),
+        "URDF mass [kg]": f"{link.mass.before:.4g}",
+        "centre x, y, z [mm]": "\n".join(center),
+        "URDF centre [mm]": "\n".join(f"{1e3 * each.before:.4g}" for each in link.center),
+        "determined by data": ", ".join(known) or "nothing",
+        "physically infeasible": "; ".join(link.marks),
+    }
 
 
 def identification_answer(
@@ -165,47 +144,42 @@ def _effective_size(fit: Fit) -> str:
 
 def _parameter_table(fit: Fit, grouped: bool = False) -> Table:
     """With `grouped` also what each base parameter groups."""
-    rows = tuple(
-        (
-            name,
-            short_number(fit.values[i], 5),
-            short_number(fit.std[i], 3),
-            relative_in_words(fit.relative_std[i]),
-            fit.units[i],
-            fixed_by_data(fit, i),
-            *([fit.words[i] or "–"] if grouped else []),
-        )
+    rows = (
+        {
+            "parameter": name,
+            "value": short_number(fit.values[i], 5),
+            "std": short_number(fit.std[i], 3),
+            "relative std": relative_in_words(fit.relative_std[i]),
+            "unit": fit.units[i],
+            "identifiable": fixed_by_data(fit, i),
+            **({"what it groups": fit.words[i] or "–"} if grouped else {}),
+        }
         for i, name in enumerate(fit.names)
     )
-    words = ("what it groups",) if grouped else ()
-    names = ("parameter", "value", "std", "relative std", "unit", "identifiable", *words)
     title = "Parameters (base parameters stand for sums of inertial ones, and may be negative)"
-    return Table(title, names, rows, left=("parameter", "unit", "identifiable"), words=words)
+    left = ("parameter", "unit", "identifiable")
+    return Table.of(title, rows, left, words=("what it groups",), folded=grouped)
 
 
 def _error_table(found: Identification | StoredFit) -> Table:
     """Errors per joint on the held-out part, and the training part's and the noise floor beside."""
-    error, floor, joints = found.error, found.noise_floor, found.fit.joint_names
-    rows = tuple(
-        (
-            joint,
-            percent(error.relative_moving[joint]),
-            percent(error.relative[joint]),
-            figure(error.rms[joint]),
-            *floor_cells(floor, joint),
-            figure(error.rms_raw[joint]),
-            unit,
-            percent(found.training_error.relative[joint]),
-        )
-        for joint, unit in zip(joints, found.torque_units, strict=True)
+    error, floor = found.error, found.noise_floor
+    rows = (
+        {
+            "joint": joint,
+            "error, moving": percent(error.relative_moving[joint]),
+            "error, all": percent(error.relative[joint]),
+            "RMS": figure(error.rms[joint]),
+            **({} if floor is None else {"noise floor": figure(floor.get(joint, nan))}),
+            "RMS unfiltered": figure(error.rms_raw[joint]),
+            "unit": unit,
+            "training error": percent(found.training_error.relative[joint]),
+        }
+        for joint, unit in zip(found.fit.joint_names, found.torque_units, strict=True)
         if not isnan(error.rms[joint])  # its torque was not measured
     )
     title = "Error of the torque on held-out data (RMS: of all samples, filtered, and as recorded)"
-    names = (
-        "joint", "error, moving", "error, all", "RMS", *floor_columns(floor), "RMS unfiltered",
-        "unit", "training error",
-    )  # fmt: skip
-    return Table(title, names, rows, left=("joint", "unit"))
+    return Table.of(title, rows, left=("joint", "unit"))
 
 
 def _data(found: Identification) -> dict[str, Any]:
@@ -340,7 +314,7 @@ def parameter_section(fit: Fit) -> Section:
     """Values with intervals, and how well the data fix each."""
     blocks: list[Block] = [
         Charts(parameter_charts(fit)),
-        replace(_parameter_table(fit, grouped=True), folded=True),
+        _parameter_table(fit, grouped=True),
         *correlated_parameters(fit),
         *link_parts(fit.links),
     ]

@@ -39,19 +39,18 @@ def dataset_parts(data: Dataset) -> Parts:
 def _run_table(title: str, runs: Sequence[Run]) -> Table:
     """Also where each came from, if they were read from files."""
     read = any(run.origin.file for run in runs)
-    rows = tuple(
-        (
-            run.label,
-            str(len(run.t)),
-            f"{run.duration:.2f}",
-            f"{1.0 / run.step:.4g}",
-            f"{run.usable().mean():.1%}",
-            *([f"{run.origin.file} {run.origin.place}".strip()] if read else []),
-        )
+    rows = (
+        {
+            "run": run.label,
+            "samples": str(len(run.t)),
+            "seconds": f"{run.duration:.2f}",
+            "rate [Hz]": f"{1.0 / run.step:.4g}",
+            "usable": f"{run.usable().mean():.1%}",
+            **({"from": f"{run.origin.file} {run.origin.place}".strip()} if read else {}),
+        }
         for run in runs
     )
-    names = ("run", "samples", "seconds", "rate [Hz]", "usable", *(["from"] if read else []))
-    return Table(title, names, rows, left=("run",), words=("from",) if read else ())
+    return Table.of(title, rows, left=("run",), words=("from",))
 
 
 def _run_in_words(run: Run) -> str:
@@ -98,14 +97,18 @@ def inspection_parts(found: AnyInspection) -> list[Part]:
 
 def checks_table(found: AnyInspection) -> Table:
     """A row for every check: its status, its joints, and what settles it."""
-    rows = tuple(
-        (each.name, each.status, ", ".join(each.joints), written(each.settings))
+    rows = (
+        {
+            "check": each.name,
+            "status": each.status,
+            "joints": ", ".join(each.joints),
+            "key that resolves it": written(each.settings),
+        }
         for each in found.results
     )
     bold = tuple(k for k, each in enumerate(found.results) if each.status != "ok")
-    columns = ("check", "status", "joints", "key that resolves it")
     words = ("joints", "key that resolves it")
-    return Table("Set-up checks", columns, rows, columns, words, bold)
+    return Table.of("Set-up checks", rows, left=("check", "status"), words=words, bold=bold)
 
 
 def remarks(found: AnyInspection) -> list[str]:

@@ -42,13 +42,19 @@ def inspections_parts(found: Inspections) -> Parts:
 
 
 def _table(title: str, inspection: Inspection) -> Table:
-    rows = []
-    for key, (state, _) in inspection.states.items():
-        worst = inspection.margins[key]
-        figures = (f"{worst.margin:.5f}", worst.unit, worst.label, f"{worst.time:.4f}")
-        rows.append((key, *figures, "BROKEN" if state == "broken" else state))
-    names = ("constraint", "margin", "unit", "where", "time [s]", "verdict")
-    return Table(title, names, tuple(rows), ("constraint", "unit", "verdict"), ("where",))
+    rows = (
+        {
+            "constraint": key,
+            "margin": f"{worst.margin:.5f}",
+            "unit": worst.unit,
+            "where": worst.label,
+            "time [s]": f"{worst.time:.4f}",
+            "verdict": "BROKEN" if state == "broken" else state,
+        }
+        for key, (state, _) in inspection.states.items()
+        for worst in [inspection.margins[key]]
+    )
+    return Table.of(title, rows, left=("constraint", "unit", "verdict"), words=("where",))
 
 
 def _alarms(name: str, inspection: Inspection) -> list[str]:

@@ -17,31 +17,30 @@ def load_answer(found: LoadIdentification) -> Answer:
 
 def load_parts(found: LoadIdentification) -> Parts:
     """A sentence, the ten parameters, and errors per joint."""
-    rows = tuple(
-        (name, with_deviation(scale * each.value, scale * each.std), unit)
+    rows = (
+        {
+            "parameter": name,
+            "value": with_deviation(scale * each.value, scale * each.std),
+            "unit": unit,
+        }
         for name, each in found.parameters.items()
         for scale, unit in [(1e3, "mm") if each.unit == "m" else (1.0, each.unit)]
     )
     title = (
         f"Load on {found.link}, in its frame (± one standard deviation; inertia about the centre)"
     )
-    errors = tuple(
-        (
-            joint,
-            percent(found.without.relative_moving[joint]),
-            percent(found.with_load.relative_moving[joint]),
-        )
-        for joint in found.with_load.relative_moving
+    errors = (
+        {
+            "joint": joint,
+            "fit without the load": percent(found.without.relative_moving[joint]),
+            "with it": percent(error),
+        }
+        for joint, error in found.with_load.relative_moving.items()
     )
     return [
         _in_words(found),
-        Table(title, ("parameter", "value", "unit"), rows, left=("parameter", "unit")),
-        Table(
-            "Torque error on these data, where the joint moves",
-            ("joint", "fit without the load", "with it"),
-            errors,
-            left=("joint",),
-        ),
+        Table.of(title, rows, left=("parameter", "unit")),
+        Table.of("Torque error on these data, where the joint moves", errors, left=("joint",)),
     ]
 
 

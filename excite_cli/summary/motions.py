@@ -1,6 +1,7 @@
 """Planned motions: condition numbers beside each other, worst margins, what comes after them."""
 
 from collections.abc import Sequence
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -117,25 +118,23 @@ def invariants_in_words(found: Invariants) -> str:
 
 
 _NUMBERS = ("index", "condition_number", "stacked_condition_number")
-_FINE = "stacked, finely sampled"
 
 
 def motion_table(motions: Sequence[Motion]) -> Table:
     """Condition numbers of each motion and of the stack (the paper's Table I), status, effort."""
-    rows = tuple(
-        (
-            str(motion.index),
-            f"{motion.condition_number:.2f}",
-            f"{motion.stacked_condition_number:.2f}",
-            _dense(motion),
-            motion.status if motion.improved else f"{motion.status}; no improvement",
-            str(motion.iterations),
-            f"{motion.seconds:.1f}",
-        )
+    rows = (
+        {
+            "motion": str(motion.index),
+            "own": f"{motion.condition_number:.2f}",
+            "stacked": f"{motion.stacked_condition_number:.2f}",
+            "stacked, finely sampled": _dense(motion),
+            "status": motion.status + "; no improvement" * (not motion.improved),
+            "iterations": str(motion.iterations),
+            "planning [s]": f"{motion.seconds:.1f}",
+        }
         for motion in motions
     )
-    names = ("motion", "own", "stacked", _FINE, "status", "iterations", "planning [s]")
-    return Table("Condition numbers", names, rows, left=("status",))
+    return Table.of("Condition numbers", rows, left=("status",))
 
 
 def _dense(motion: Motion) -> str:
@@ -155,32 +154,37 @@ def margin_table(motions: Sequence[Motion], detail: Detail = Detail.BRIEF) -> Ta
         worst = motion.margins[name]
         states = [each.certified[name] for each in held if name in each.certified]
         state = "–" if not states else "proved" if all(states) else "sampled"
-        verdict = (f"{100 * worst.share:.2g} %", "BROKEN" if worst.violations else state)
-        figures = (f"{worst.margin:.4f}", worst.unit, worst.label, str(motion.index))
-        rows.append((name, *figures, f"{worst.time:.3f}", *(verdict if detail else ())))
-    names = ("constraint", "margin", "unit", "where", "motion", "time [s]")
-    more = ("share of its size", "verdict") if detail else ()
-    return Table(
-        "Worst margins, sampled at 1 kHz",
-        (*names, *more),
-        tuple(rows),
-        left=("constraint", "unit", *more[1:]),
-        words=("where",),
-    )
+        row = {
+            "constraint": name,
+            "margin": f"{worst.margin:.4f}",
+            "unit": worst.unit,
+            "where": worst.label,
+            "motion": str(motion.index),
+            "time [s]": f"{worst.time:.3f}",
+        }
+        if detail:
+            row["share of its size"] = f"{100 * worst.share:.2g} %"
+            row["verdict"] = "BROKEN" if worst.violations else state
+        rows.append(row)
+    left = ("constraint", "unit", "verdict")
+    return Table.of("Worst margins, sampled at 1 kHz", rows, left, words=("where",))
 
 
 def outlook_table(outlook: dict[str, Any]) -> Table:
     """What the motions are expected to tell apart."""
     least = outlook["distinguished_from"]
     title = f"Kullback-Leibler divergence of effects [nats]; from {least:g} on, distinguished"
-    names = ("effect", "or", "measured data", "with this motion", "motions needed")
-    rows = []
-    for pair in outlook["pairs"]:
-        needed = pair["motions_needed"]
-        figures = (f"{pair['kl_so_far']:.2g}", f"{pair['expected_kl']:.3g}")
-        count = "> 1000" if needed is None else str(needed)
-        rows.append((pair["effect"], pair["alias"], *figures, count))
-    return Table(title, names, tuple(rows), words=("effect", "or"))
+    rows = (
+        {
+            "effect": pair["effect"],
+            "or": pair["alias"],
+            "measured data": f"{pair['kl_so_far']:.2g}",
+            "with this motion": f"{pair['expected_kl']:.3g}",
+            "motions needed": str(pair["motions_needed"] or "> 1000"),
+        }
+        for pair in outlook["pairs"]
+    )
+    return Table.of(title, rows, words=("effect", "or"))
 
 
 def motion_sentence(motion: Motion) -> str:
@@ -279,26 +283,15 @@ def comparison_parts(found: Comparison) -> Parts:
 def pairs_of_numbers_table(optimized: Sequence[Motion], random: Sequence[RandomMotion]) -> Table:
     """Condition numbers, own and stacked, motion by motion."""
     rows = []
-    for index in range(max(len(optimized), len(random))):
-        first = optimized[index] if index < len(optimized) else None
-        second = random[index] if index < len(random) else None
-        ratio = (
-            f"{second.stacked_condition_number / first.stacked_condition_number:.2f}"
-            if first and second
-            else ""
-        )
-        rows.append((str(index + 1), *_pair(first), *_pair(second), ratio))
-    title = "Condition numbers, optimised and random (the paper's Tables I, II)"
-    names = (
-        "motion", "optimised", "optimised, stacked", "random", "random, stacked", "stacked ratio",
-    )  # fmt: skip
-    return Table(title, names, tuple(rows))
-
-
-def _pair(motion: Motion | RandomMotion | None) -> tuple[str, str]:
-    if motion is None:
-        return "", ""
-    return f"{motion.condition_number:.1f}", f"{motion.stacked_condition_number:.1f}"
+    for index, (first, second) in enumerate(zip_longest(optimized, random), start=1):
+        row = {"motion": str(index)}
+        for word, motion in (("optimised", first), ("random", second)):
+            row[word] = f"{motion.condition_number:.1f}" if motion else ""
+            row[f"{word}, stacked"] = f"{motion.stacked_condition_number:.1f}" if motion else ""
+        both = first and second
+        ratio = second.stacked_condition_number / first.stacked_condition_number if both else 0.0
+        rows.append({**row, "stacked ratio": f"{ratio:.2f}" if both else ""})
+    return Table.of("Condition numbers, optimised and random (the paper's Tables I, II)", rows)
 
 
 def _comparison_in_words(found: Comparison) -> str:

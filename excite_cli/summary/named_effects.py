@@ -80,8 +80,6 @@ def friction_table(lines: Sequence[FrictionLine]) -> Table:
     )
 
 
-_SIZE = "size ± std"
-_WITHOUT_IT = "held-out, without it"
 _LACKING = (
     "What the declared model lacks (share: part of the fall of the mean error of all joints; "
     "the last column: verdict on held-out data, error of the most affected joint without it)"
@@ -149,28 +147,24 @@ def effect_table(
 
     Of what is only approximated, also what it may be.
     """
-    surrogates = title == _SURROGATES
-    rows = tuple(
-        (
-            named.effect.kind,
-            place_in_words(named.effect, everything),
-            "\n".join(value_in_words(name, value) for name, value in named.parameters.items()),
-            *([p_in_words(named.p_value, named.least_p), percent(named.gain)] if detail else []),
-            points(named.error_reduction),
-            held_out_in_words(named),
-            *([approximation_in_words(named.approximates)] if named.approximates else []),
-        )
-        for named in shown
-    )
-    evidence = ("p", "gain") if detail else ()
-    form = ("true form",) if surrogates else ()
-    return Table(
-        title,
-        ("effect", "where", _SIZE, *evidence, "share", _WITHOUT_IT, *form),
-        rows,
-        left=("effect",),
-        words=("where", _SIZE, _WITHOUT_IT, *form),
-    )
+    rows = []
+    for named in shown:
+        sizes = (value_in_words(name, value) for name, value in named.parameters.items())
+        row = {
+            "effect": named.effect.kind,
+            "where": place_in_words(named.effect, everything),
+            "size ± std": "\n".join(sizes),
+        }
+        if detail:
+            row["p"] = p_in_words(named.p_value, named.least_p)
+            row["gain"] = percent(named.gain)
+        row["share"] = points(named.error_reduction)
+        row["held-out, without it"] = held_out_in_words(named)
+        if named.approximates:
+            row["true form"] = approximation_in_words(named.approximates)
+        rows.append(row)
+    words = ("where", "size ± std", "held-out, without it", "true form")
+    return Table.of(title, rows, left=("effect",), words=words)
 
 
 def other_names(named: NamedEffect, everything: int) -> list[str]:
@@ -225,16 +219,19 @@ def absorbed_parts(found: Diagnosis) -> Parts:
     """Candidates that would show as other values of parameters: a table, if there are any."""
     if not found.absorbed:
         return []
-    rows = tuple(
-        (each.kind, joints_in_words(each.joints, len(found.joint_names)), ", ".join(each.by))
+    rows = (
+        {
+            "effect": each.kind,
+            "where": joints_in_words(each.joints, len(found.joint_names)),
+            "confounded with": ", ".join(each.by),
+        }
         for each in found.absorbed
     )
-    table = Table(
+    table = Table.of(
         "Not identifiable: confounded with parameters of the model",
-        ("effect", "where", "confounded with"),
         rows,
         left=("effect", "where"),
         words=("confounded with",),
-        folded=len(rows) > _MOST_ABSORBED,
+        folded=len(found.absorbed) > _MOST_ABSORBED,
     )
     return [table, *settled_in_words(found)]

@@ -160,21 +160,21 @@ def _reason(reason: RunExplanation, found: Score) -> str:
 
 def runs_table(found: Score) -> Table:
     """Every run with its error, state and likely reason."""
-    rows = tuple(
-        (
-            run.name,
-            f"{run.seconds:.4g}",
-            percent(run.error.mean_relative_moving),
-            percent(run.error.mean_relative),
-            _worst(run),
-            "ALARM" if run.alarm else "" if run.judged or found.made is None else "not judged",
-            ", ".join(title_of(each.effect.kind) for each in run.reasons) if run.alarm else "",
-        )
+    rows = (
+        {
+            "run": run.name,
+            "seconds": f"{run.seconds:.4g}",
+            "error, moving": percent(run.error.mean_relative_moving),
+            "error, all": percent(run.error.mean_relative),
+            "multiple": _worst(run),
+            "state": "ALARM" * run.alarm or "not judged" * bool(found.made and not run.judged),
+            "likely reason": ", ".join(title_of(each.effect.kind) for each in run.reasons)
+            * run.alarm,
+        }
         for run in found.runs
     )
-    return Table(
+    return Table.of(
         "Runs: torque error, and its part beyond friction as a multiple of what the model leaves",
-        ("run", "seconds", "error, moving", "error, all", "multiple", "state", "likely reason"),
         rows,
         left=("run", "state"),
         words=("likely reason",),
@@ -190,35 +190,22 @@ def _worst(run: ScoredRun) -> str:
 def joints_table(found: Score) -> Table:
     """Every joint's error over all runs, beside that when the model was made."""
     made = found.made
-    rows = tuple(
-        (
-            joint,
-            percent(found.error.relative_moving[joint]),
-            percent(made.relative_moving[joint]) if made else "",
-            figure(found.error.rms[joint]),
-            figure(made.rms[joint]) if made else "",
-            figure(found.noise[joint]) if joint in found.noise else "",
-            unit,
-            max(found.runs, key=lambda run: _ratio(run, joint)).name if made else "",
-        )
+    rows = (
+        {
+            "joint": joint,
+            "error, moving": percent(found.error.relative_moving[joint]),
+            "when made": percent(made.relative_moving[joint]) if made else "",
+            "RMS, all": figure(found.error.rms[joint]),
+            "RMS when made": figure(made.rms[joint]) if made else "",
+            "noise": figure(found.noise[joint]) if joint in found.noise else "",
+            "unit": unit,
+            "worst run": max(found.runs, key=lambda run: _ratio(run, joint)).name if made else "",
+        }
         for joint, unit in zip(found.joint_names, found.units, strict=True)
         if not isnan(found.error.rms[joint])  # its torque was not measured
     )
-    return Table(
-        "Joints: torque error over all runs, and when the model was made",
-        (
-            "joint",
-            "error, moving",
-            "when made",
-            "RMS, all",
-            "RMS when made",
-            "noise",
-            "unit",
-            "worst run",
-        ),
-        rows,
-        left=("joint", "unit", "worst run"),
-    )
+    title = "Joints: torque error over all runs, and when the model was made"
+    return Table.of(title, rows, left=("joint", "unit", "worst run"))
 
 
 def _ratio(run: ScoredRun, joint: str) -> float:
@@ -263,20 +250,21 @@ def _run_in_words(run: ScoredRun) -> str:
 
 
 def _run_parts(run: ScoredRun) -> Parts:
-    names = ("joint", "where moving", "RMS", "beyond friction", "tolerance", "ratio")
-    rows = tuple(
-        (
-            joint,
-            percent(run.error.relative_moving[joint]),
-            figure(rms),
-            figure(run.ratio[joint] * run.allowed[joint]) if joint in run.ratio else "",
-            figure(run.allowed[joint]) if joint in run.allowed else "",
-            figure(run.ratio[joint]) if joint in run.ratio else "",
+    rows = []
+    for joint, rms in run.error.rms.items():
+        ratio, allowed = run.ratio.get(joint), run.allowed.get(joint)
+        rows.append(
+            {
+                "joint": joint,
+                "where moving": percent(run.error.relative_moving[joint]),
+                "RMS": figure(rms),
+                "beyond friction": "" if ratio is None else figure(ratio * run.allowed[joint]),
+                "tolerance": "" if allowed is None else figure(allowed),
+                "ratio": "" if ratio is None else figure(ratio),
+            }
         )
-        for joint, rms in run.error.rms.items()
-    )
-    bold = tuple(k for k, row in enumerate(rows) if row[0] in run.left)
-    return [_run_in_words(run), Table("", names, rows, left=("joint",), bold=bold)]
+    bold = tuple(k for k, row in enumerate(rows) if row["joint"] in run.left)
+    return [_run_in_words(run), Table.of("", rows, left=("joint",), bold=bold)]
 
 
 show(ScoredRun, _run_in_words, _run_parts)

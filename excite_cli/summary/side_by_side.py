@@ -148,20 +148,19 @@ def _cut(name: str, longest: int = 22) -> str:
 
 
 def _numbers(results: Mapping[str, Result]) -> Table:
-    rows = tuple(
-        (
-            name,
-            str(len(result.motions)),
-            " → ".join(in_figures(m.stacked_condition_number) for m in result.motions),
-            in_figures(result.random[-1].stacked_condition_number) if result.random else "–",
-            ", ".join(result.priors) or "–",
-            str(result.seed),
-            f"{sum(m.seconds for m in result.motions):.1f}",
-        )
+    rows = (
+        {
+            "file": name,
+            "motions": str(len(result.motions)),
+            "stacked": " → ".join(in_figures(m.stacked_condition_number) for m in result.motions),
+            "random": " ".join(in_figures(m.stacked_condition_number) for m in result.random[-1:]),
+            "on top of": ", ".join(result.priors),
+            "seed": str(result.seed),
+            "planning [s]": f"{sum(m.seconds for m in result.motions):.1f}",
+        }
         for name, result in results.items()
     )
-    columns = ("file", "motions", "stacked", "random", "on top of", "seed", "planning [s]")
-    return Table("Condition numbers", columns, rows, left=("file", "stacked", "on top of"))
+    return Table.of("Condition numbers", rows, left=("file", "stacked", "on top of"))
 
 
 def _margins(results: Mapping[str, Result]) -> Table:
@@ -182,56 +181,49 @@ _MEAN_ERROR = "Mean relative error of the torque where joints move"
 
 def compare_fits(fits: Mapping[str, StoredFit]) -> Section:
     """Errors of several fits on held-out data, what the data fix, and the differing keys."""
-    rows = tuple(
-        (
-            name,
-            stored.held_out_run,
-            percent(stored.training_error.mean_relative_moving),
-            percent(stored.error.mean_relative_moving),
-            f"{int(np.sum(stored.fit.identifiable))} of {len(stored.fit.names)}",
-        )
+    rows = (
+        {
+            "file": name,
+            "held-out run": stored.held_out_run,
+            "training error": percent(stored.training_error.mean_relative_moving),
+            "held-out error": percent(stored.error.mean_relative_moving),
+            "identifiable": f"{int(np.sum(stored.fit.identifiable))} of {len(stored.fit.names)}",
+        }
         for name, stored in fits.items()
     )
-    columns = ("file", "held-out run", "training error", "held-out error", "identifiable")
-    table = Table(_MEAN_ERROR, columns, rows, left=columns[:2])
+    table = Table.of(_MEAN_ERROR, rows, left=("file", "held-out run"))
     blocks = (table, differences({name: stored.config for name, stored in fits.items()}))
     return Section("compare-fits", "Fits side by side", blocks)
 
 
 def compare_diagnoses(diagnoses: Mapping[str, Diagnosis]) -> Section:
     """What several diagnoses found, their errors on held-out data and the differing keys."""
-    rows = tuple(
-        (
-            name,
-            found.held_out_run,
-            percent(found.before.mean_relative_moving),
-            percent(found.after.mean_relative_moving),
-            "; ".join(what_and_where(each.effect, len(found.joint_names)) for each in found.effects)
-            or "nothing",
-        )
-        for name, found in diagnoses.items()
-    )
-    columns = ("file", "held-out run", "declared", "with effects", "found")
+    rows = []
+    for name, found in diagnoses.items():
+        effects = [what_and_where(each.effect, len(found.joint_names)) for each in found.effects]
+        row = {
+            "file": name,
+            "held-out run": found.held_out_run,
+            "declared": percent(found.before.mean_relative_moving),
+            "with effects": percent(found.after.mean_relative_moving),
+            "found": "; ".join(effects) or "nothing",
+        }
+        rows.append(row)
     title = f"{_MEAN_ERROR}, on held-out data"
-    errors = Table(title, columns, rows, left=columns[:2], words=columns[-1:])
     joints = dict.fromkeys(joint for each in diagnoses.values() for joint in each.joint_names)
-    by_joint = tuple(
-        (
-            joint,
-            *(
-                " → ".join(
-                    percent(errors.relative_moving.get(joint, np.nan))
-                    for errors in (each.before, each.after)
-                )
-                for each in diagnoses.values()
-            ),
-        )
+    by_joint = (
+        {"joint": joint, **{name: _change(found, joint) for name, found in diagnoses.items()}}
         for joint in joints
     )
-    title = "The same joint by joint, declared → with effects"
+    beside = "The same joint by joint, declared → with effects"
     blocks = (
-        errors,
-        Table(title, ("joint", *diagnoses), by_joint, left=("joint",)),
+        Table.of(title, rows, left=("file", "held-out run"), words=("found",)),
+        Table.of(beside, by_joint, left=("joint",)),
         differences({name: found.config for name, found in diagnoses.items()}),
     )
     return Section("compare-diagnoses", "Diagnoses side by side", blocks)
+
+
+def _change(found: Diagnosis, joint: str) -> str:
+    errors = (each.relative_moving.get(joint, np.nan) for each in (found.before, found.after))
+    return " → ".join(map(percent, errors))

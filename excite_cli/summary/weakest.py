@@ -80,21 +80,20 @@ def _direction_table(columns: _Columns, direction: Array) -> Table:
     """The largest parts of the direction: coefficient and share, what the parameter groups."""
     order = np.argsort(-np.abs(direction))[:_SHOWN]
     sign = 1.0 if direction[order[0]] > 0 else -1.0
-    rows = tuple(
-        (
-            columns.names[i],
-            f"{sign * direction[i]:+.2f}",
-            f"{100 * direction[i] ** 2:.0f} %",
-            _shortened(columns.words[i]),
-        )
+    rows = (
+        {
+            "base parameter": columns.names[i],
+            "coefficient [–]": f"{sign * direction[i]:+.2f}",
+            "share [–]": f"{100 * direction[i] ** 2:.0f} %",
+            "represents": _shortened(columns.words[i]),
+        }
         for i in order
     )
     left = 1.0 - float((direction[order] ** 2).sum())
     rest = len(direction) - len(order)
     note = f"The other {rest} make up {100 * left:.0f} %." if rest else ""
-    return Table(
+    return Table.of(
         "The weakest direction",
-        ("base parameter", "coefficient [–]", "share [–]", "represents"),
         rows,
         left=("base parameter",),
         words=("represents",),
@@ -109,21 +108,20 @@ def _parameter_table(result: Result, columns: _Columns, unit: str) -> Table:
     with np.errstate(divide="ignore", invalid="ignore"):
         relative = std / np.abs(columns.expected)
     order = np.argsort(-np.where(np.isfinite(relative), relative, 0.0))
-    rows = tuple(
-        (
-            columns.names[i],
-            columns.units[i] or "–",
-            in_figures(float(columns.expected[i])),
-            in_figures(float(std[i])),
-            _percent(float(relative[i])),
-        )
+    rows = (
+        {
+            "base parameter": columns.names[i],
+            "unit": columns.units[i] or "–",
+            "by the URDF": in_figures(float(columns.expected[i])),
+            "std": in_figures(float(std[i])),
+            "of the value": _percent(float(relative[i])),
+        }
         for i in order
     )
     plain = bool(np.all(result.row_weights == 1.0))
     noise = f"1 {unit}" if plain else "one weighted unit"
-    return Table(
+    return Table.of(
         f"How well each base parameter would be known, for noise of {noise} per sample",
-        ("base parameter", "unit", "by the URDF", "std", "of the value"),
         rows,
         left=("base parameter", "unit"),
         note=f"Independent noise of {noise} on each of the {result.stack.rows} rows of the stack "
