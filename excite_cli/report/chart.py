@@ -23,6 +23,14 @@ def side_view(points: Array) -> tuple[Array, Array]:
     return np.stack([across, -up], axis=-1), np.asarray(near)
 
 
+def svg_line(one: Array, two: Array, width: float, colour: str) -> str:
+    """A thick line with round ends, from point to point (2,)."""
+    return (
+        f'<path d="M{one[0]:.1f} {one[1]:.1f}L{two[0]:.1f} {two[1]:.1f}" '
+        f'style="stroke: {colour}; stroke-width: {width:.1f}; stroke-linecap: round"></path>'
+    )
+
+
 Colour = Literal["ink", "muted", "blue", "vermilion", "green", "purple"]
 
 

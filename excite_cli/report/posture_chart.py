@@ -15,7 +15,7 @@ from excite_cli.excitation.nearest import closest_time, nearest_bodies
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.geometry.obstacles import Box
-from excite_cli.report.chart import Chart, in_figures, side_view
+from excite_cli.report.chart import Chart, in_figures, side_view, svg_line
 from excite_cli.robot.model import Array
 from excite_cli.trajectory.fade import Segment
 
@@ -103,7 +103,7 @@ def _drawn(sticks: list[_Stick], boxes: list[Array], near: NearestBodies | None)
     parts = [f'<svg viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}">']
     for box in corners:
         placed = box * scale + shift
-        parts += [_line(placed[i], placed[j], 0.8, "var(--muted)") for i, j in _EDGES]
+        parts += [svg_line(placed[i], placed[j], 0.8, "var(--muted)") for i, j in _EDGES]
     middle = depth.mean(axis=1)
     far, span = middle.min(), max(float(np.ptp(middle)), 1e-9)
     for k in np.argsort(middle, kind="stable"):
@@ -113,16 +113,9 @@ def _drawn(sticks: list[_Stick], boxes: list[Array], near: NearestBodies | None)
         fill = f"color-mix(in oklab, var(--muted) {light:.0f}%, var(--card))"
         if sticks[k].near:
             fill = "color-mix(in oklab, var(--vermilion) 75%, var(--card))"
-        parts.append(_line(one, two, width, "var(--muted)"))
-        parts.append(_line(one, two, max(width - 1.4, 0.9), fill))
+        parts.append(svg_line(one, two, width, "var(--muted)"))
+        parts.append(svg_line(one, two, max(width - 1.4, 0.9), fill))
     if near is not None:
         one, two = side_view(near.ends[0])[0] * scale + shift
-        parts.append(_line(one, two, 1.6, "var(--vermilion)"))
+        parts.append(svg_line(one, two, 1.6, "var(--vermilion)"))
     return "".join([*parts, "</svg>"])
-
-
-def _line(one: Array, two: Array, width: float, colour: str) -> str:
-    return (
-        f'<path d="M{one[0]:.1f} {one[1]:.1f}L{two[0]:.1f} {two[1]:.1f}" '
-        f'style="stroke: {colour}; stroke-width: {width:.1f}; stroke-linecap: round"></path>'
-    )

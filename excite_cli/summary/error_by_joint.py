@@ -88,10 +88,12 @@ def _moving(found: Diagnosis) -> Table:
     return _with_mean(title, rows, errors)
 
 
-def _with_mean(title: str, rows: list[dict[str, str]], means: dict[str, str]) -> Table:
-    last = (len(rows),)
-    every = [*rows, {"joint": "mean", **means}]
-    return Table.of(title, every, ("joint", "unit"), words=(_OFF,), bold=last, parted=last)
+def _with_mean(
+    title: str, rows: list[dict[str, str]], means: dict[str, str], folded: bool = False
+) -> Table:
+    last, every = (len(rows),), [*rows, {"joint": "mean", **means}]
+    look = {"bold": last, "parted": last, "folded": folded}
+    return Table.of(title, every, ("joint", "unit"), words=(_OFF,), **look)
 
 
 def _row(found: Diagnosis, joint: str, unit: str, moving: bool) -> dict[str, str]:
@@ -204,6 +206,7 @@ def _parts(found: Diagnosis) -> Table:
         left=("joint", "unit"),
         words=("contribution",),
         parted=tuple(parted[1:]),
+        folded=True,
     )
 
 
@@ -214,4 +217,4 @@ def _all_samples(found: Diagnosis) -> Table:
         "effects, the torque as recorded)"
     )
     errors = {name: percent(each.mean_relative) for name, each in _errors(found).items()}
-    return _with_mean(title, rows, errors)
+    return _with_mean(title, rows, errors, folded=True)

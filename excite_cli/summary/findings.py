@@ -1,9 +1,10 @@
 """What was noticed about data, and every choice made between the file and the fit."""
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
-from excite_cli.measurement.dataset import Finding
+from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.identification.stored_model import StoredFit
 from excite_cli.shown.answer import Block, Fold, Table, Text
 
 _WORDS = {
@@ -29,28 +30,8 @@ _WORDS = {
 _SHARES = ("standstill_share", "invalid_share")
 
 
-class Recorded(Protocol):
-    """A record that was made of data, with all that was chosen for it."""
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """What was noticed."""
-
-    @property
-    def processing(self) -> dict[str, Any]:
-        """What was chosen."""
-
-    @property
-    def config(self) -> str:
-        """The problem, as YAML."""
-
-    @property
-    def versions(self) -> dict[str, str]:
-        """Of libraries."""
-
-
 def data_blocks(
-    found: Recorded, joint_names: Sequence[str], tables: Sequence[Table] = ()
+    found: Diagnosis | StoredFit, joint_names: Sequence[str], tables: Sequence[Table] = ()
 ) -> list[Block]:
     """What was noticed, warnings first; `tables`; every choice by its name; config, versions."""
     ranked = sorted(found.findings, key=lambda each: each.severity != "warning")

@@ -86,23 +86,9 @@ def result_figures(result: Result, problem: Problem) -> list[KeyFigure]:
     duration = in_figures(problem.trajectory.duration)
     motions = f"{len(result.motions)} × {duration} s"
     found.append(KeyFigure("motions", motions, f"found in {seconds} s"))
-    return [*found, *([_proved(result)] if problem.constraints else [])]
-
-
-def _proved(result: Result) -> KeyFigure:
-    """Whether all constraints are proved."""
-    found = [proved for m in result.motions for proved in m.certified.values()]
-    if broken := sum(w.violations > 0 for m in result.motions for w in m.margins.values()):
-        return KeyFigure("constraints", f"{broken} BROKEN", "at controller rate")
-    doubted = any(motion.doubt for motion in result.motions)
-    if doubted or not found:
-        why = "not as they were proved" if doubted else "not proved between instants"
-        return KeyFigure("constraints", "kept at 1 kHz", why)
-    if all(found):
-        return KeyFigure("constraints", "all proved", "at every instant of every motion")
-    return KeyFigure(
-        "constraints", f"{sum(found)} of {len(found)} proved", "the others kept at 1 kHz"
-    )
+    (value, remark), _ = _kept(result)
+    kept = [KeyFigure("constraints", value, remark)] if problem.constraints else []
+    return [*found, *kept]
 
 
 def condition_words(result: Result) -> str:
@@ -190,7 +176,7 @@ def margin_section(result: Result, problem: Problem) -> Section:
         for motion in drawn_motions(result.motions, len(problem.constraints))
     }
     blocks = (
-        _verdict(result),
+        _kept(result)[1],
         margin_table(result.motions, Detail.PAGE),
         *_pairs(problem),
         *_choice(result.motions, drawn),
@@ -202,35 +188,42 @@ def margin_section(result: Result, problem: Problem) -> Section:
     return Section("margins", "Margins", blocks, lead)
 
 
-def _verdict(result: Result) -> Text:
-    loose = [
-        f"{name} (motion {motion.index})"
+def _kept(result: Result) -> tuple[tuple[str, str], Text]:
+    """How constraints are kept: in two words each, and as a sentence."""
+    proved = {
+        f"{name} (motion {motion.index})": each
         for motion in result.motions
-        for name, proved in motion.certified.items()
-        if not proved
-    ]
+        for name, each in motion.certified.items()
+    }
+    loose = [name for name, each in proved.items() if not each]
     broken = [
         f"{name} (motion {motion.index})"
         for motion in result.motions
         for name, worst in motion.margins.items()
         if worst.violations
     ]
+    kept = "kept at 1 kHz"
     if broken:
-        return Text(f"Broken at controller rate: {', '.join(broken)}.", "bad")
+        words = Text(f"Broken at controller rate: {', '.join(broken)}.", "bad")
+        return (f"{len(broken)} BROKEN", "at controller rate"), words
     if doubts := "; ".join(doubts_in_words(result.motions)):
-        return Text(f"Kept at every millisecond, but {doubts}. `excite check` judges it.", "bad")
-    if not any(motion.certified for motion in result.motions):
-        return Text(
+        text = f"Kept at every millisecond, but {doubts}. `excite check` judges it."
+        return (kept, "not as they were proved"), Text(text, "bad")
+    if not proved:
+        text = (
             "Kept at every millisecond. Between these instants nothing was proved when the motions "
             "were made (optimizer.certify: false); `excite check CONFIG FILE.h5` does."
         )
+        return (kept, "not proved between instants"), Text(text)
     if loose:
-        return Text(
+        text = (
             f"Kept at every millisecond; not proved between: {', '.join(loose)}. "
-            "`excite check CONFIG FILE.h5` says why.",
-            "bad",
+            "`excite check CONFIG FILE.h5` says why."
         )
-    return Text("Every constraint of every motion is proved to hold at every instant.", "good")
+        few = f"{len(proved) - len(loose)} of {len(proved)} proved"
+        return (few, "the others kept at 1 kHz"), Text(text, "bad")
+    text = "Every constraint of every motion is proved to hold at every instant."
+    return ("all proved", "at every instant of every motion"), Text(text, "good")
 
 
 def _pairs(problem: Problem) -> list[Block]:
