@@ -85,10 +85,10 @@ def _card(parts: Sequence[TorqueTrace], j: int, name: str, unit: str, points: in
     measured = _joined([part.measured[at, j] for part in parts])
     predicted = _joined([part.predicted[at, j] for part in parts])
     factor, of_torque = readable_unit(unit, _largest(measured))
-    rest = [Curve("left", measured - predicted, "vermilion")]
+    rest = [Curve("residual", measured - predicted, "vermilion")]
     if before:
         alone = _joined([part.before[at, j] for part in parts if part.before is not None])
-        rest.insert(0, Curve("left before", measured - alone, "muted", "dashed"))
+        rest.insert(0, Curve("residual, declared model", measured - alone, "muted", "dashed"))
     small, of_left = readable_unit(unit, max(_largest(each.y) for each in rest))
     upper = Panel(
         f"{torque_or_force(unit)} [{of_torque}]",
@@ -97,7 +97,7 @@ def _card(parts: Sequence[TorqueTrace], j: int, name: str, unit: str, points: in
             Curve("model", factor * predicted, "blue"),
         ),
     )
-    lower = Panel(f"left [{of_left}]", tuple(replace(each, y=small * each.y) for each in rest))
+    lower = Panel(f"residual [{of_left}]", tuple(replace(each, y=small * each.y) for each in rest))
     mixed = {part.held_out for part in parts} == {False, True}
     return Plot(
         name,

@@ -41,8 +41,8 @@ def _row(each: CampaignRound) -> dict[str, str]:
         "pace": f"{min(m.pace for m in each.motions):.0%}",
         "seconds": f"{sum(m.seconds for m in each.motions if m.data):.0f}",
         "efficiency": "" if each.efficiency is None else f"{each.efficiency:.2%}",
-        "before": f"{learned.before:.2%}" if learned else "",
-        "after": f"{learned.after:.2%}" if learned else "",
+        "declared": f"{learned.before:.2%}" if learned else "",
+        "with effects": f"{learned.after:.2%}" if learned else "",
         "torque std [σ]": "" if known is None else f"{known:.2g}",
         "effects": ", ".join(learned.effects) if learned else "",
     }
@@ -126,7 +126,7 @@ def _plot(done: list[CampaignRound]) -> Plot:
         "held-out error [%]",
         (
             Curve("declared model", before, "vermilion", "joined"),
-            Curve("with all effects found", after, "blue", "joined"),
+            Curve("with effects", after, "blue", "joined"),
         ),
         height=200,
         logarithmic=bool((before > 0).all() and (after > 0).all()),

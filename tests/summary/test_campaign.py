@@ -20,8 +20,8 @@ def test_the_reason_comes_first_and_seconds_add_up() -> None:
         "pace": "30%",
         "seconds": "12",
         "efficiency": "",
-        "before": "10.00%",
-        "after": "2.00%",
+        "declared": "10.00%",
+        "with effects": "2.00%",
         "torque std [σ]": "0.3",
         "effects": "spring on elbow",
     }
