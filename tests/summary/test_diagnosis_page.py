@@ -16,7 +16,6 @@ from excite_cli.diagnosis.records import (
     JointAlias,
     NamedEffect,
 )
-from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.diagnosis.words import approximation_in_words, covariate_in_words
 from excite_cli.effects.base import Value
 from excite_cli.measurement.dataset import Finding
@@ -25,9 +24,24 @@ from excite_cli.report.effect_chart import Cloud, law_line
 from excite_cli.report.page import render
 from excite_cli.report.plot import Plot
 from excite_cli.report.residual_chart import residuals_in_time
-from excite_cli.shown.answer import Block, Charts, Choice, Fold, Page, Section, Table, Text
+from excite_cli.shown.answer import (
+    Block,
+    Charts,
+    Choice,
+    Detail,
+    Fold,
+    Page,
+    Section,
+    Table,
+    Text,
+    parts_of,
+)
 from excite_cli.summary.assembly import Source, page_of
-from excite_cli.summary.diagnosis import diagnosis_figures, diagnosis_sections
+from excite_cli.summary.diagnosis import (
+    diagnosis_figures,
+    diagnosis_parts,
+    diagnosis_sections,
+)
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis, make_traces
 from tests.report.structure import Structure
 
@@ -231,25 +245,25 @@ def test_effects_that_carry_less_than_a_hundredth_of_the_fall_are_folded(
     assert spring.folded == folded
 
 
-def test_verdicts_on_held_out_data_stand_in_the_table_and_on_the_card(
-    diagnosis: Diagnosis, sections: dict[str, Section]
-) -> None:
-    table = next(b for b in sections["diagnosis-found"].blocks if isinstance(b, Table))
-    assert table.rows[0][table.columns.index("held-out, without it")] == "confirmed, +6.00 pp"
+def test_verdicts_on_held_out_data_stand_on_the_card(sections: dict[str, Section]) -> None:
     (chart,) = charts_of(sections["diagnosis-evidence"])
     assert "Held-out, without it: confirmed, +6.00 pp." in chart.caption
 
 
-def test_what_was_weighed_and_what_would_settle_the_absorbed_is_told(diagnosis: Diagnosis) -> None:
-    """The one or the other: what is weighed settles nothing more."""
+def test_the_page_has_every_table_and_sentence_of_the_terminal(diagnosis: Diagnosis) -> None:
+    """All that a verbose answer says, but how the data were processed, which is a table there."""
     (named, *_) = diagnosis.effects
     absorbed = (ConfoundedCandidate("wrench_gain", ("elbow",), ("m[elbow]",), 0.0),)
-    free = section_of(replace(diagnosis, absorbed=absorbed), "found")
-    weighed = replace(named, verdict=HeldOutVerdict.WEIGHED)
-    told = section_of(replace(diagnosis, effects=(weighed,), absorbed=absorbed), "found")
-    settled = [" becomes identifiable if " in str(each.blocks) for each in (free, told)]
-    assert settled == [True, False]
-    assert "held-out data cannot test this effect" in str(told.blocks)
+    found = replace(diagnosis, effects=(replace(named, aliases=()), named), absorbed=absorbed)
+    processing = {"samples": 10, "rate": 20.0, "candidates": 3, "inflation": 1.0}
+    told = diagnosis_parts(replace(found, processing=processing), Detail.VERBOSE)
+    (answer, processed, *parts) = told
+    page = parts_of(diagnosis_sections(found))
+    assert "10 training samples" in str(processed)
+    assert any(isinstance(part, Table) for part in parts)
+    for part in parts:
+        assert part in page, part
+    assert page_of([Source("d", "d.h5", found)], silent).answers[0].text == answer
 
 
 def test_warnings_are_counted_on_top(diagnosis: Diagnosis) -> None:
