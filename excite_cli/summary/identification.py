@@ -117,7 +117,6 @@ def _next(found: Identification, file: str | None) -> Parts:
 
 def identification_parts(found: Identification) -> Parts:
     """Parameters, errors per joint, and sentences."""
-    low, high = found.error.interval
     fit = found.fit
     consistent = consistency_in_words(fit)
     above = above_the_floor(found.error, found.noise_floor)
@@ -126,13 +125,20 @@ def identification_parts(found: Identification) -> Parts:
         _error_table(found),
         *link_parts(fit.links),
         *([above] if above else []),
-        f"Mean relative error on {found.held_out_run}: {found.error.mean_relative:.2%} "
-        f"(95% interval {low:.2%} to {high:.2%}); where joints move "
-        f"{found.error.mean_relative_moving:.2%}.",
+        _mean_error(found),
         _effective_size(fit),
         f"{found.hausman.sentence()[0].upper()}{found.hausman.sentence()[1:]}.",
         *([consistent] if consistent else []),
     ]
+
+
+def _mean_error(found: Identification | StoredFit) -> str:
+    low, high = found.error.interval
+    return (
+        f"Mean relative error on {found.held_out_run}: {found.error.mean_relative:.2%} "
+        f"(95% interval {low:.2%} to {high:.2%}); where joints move "
+        f"{found.error.mean_relative_moving:.2%}."
+    )
 
 
 def _effective_size(fit: Fit) -> str:
@@ -275,7 +281,7 @@ def fit_sections(stored: StoredFit) -> list[Section]:
             "fit-errors",
             "Error of the fit",
             tuple(_error_blocks(stored)),
-            f"Held-out: {stored.held_out_run}, which took no part in the fit.",
+            f"{stored.held_out_run} took no part in the fit. {_mean_error(stored)}",
         ),
         parameter_section(fit),
         Section(

@@ -13,6 +13,7 @@ import numpy as np
 from excite_cli.dynamics.regressor import standard_parameter_unit, standard_parameters
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
+from excite_cli.identification.fit_words import relative_in_words
 from excite_cli.report.chart import in_figures
 from excite_cli.report.condition_chart import row_unit
 from excite_cli.robot.model import Array
@@ -114,7 +115,7 @@ def _parameter_table(result: Result, columns: _Columns, unit: str) -> Table:
             "unit": columns.units[i] or "–",
             "by the URDF": in_figures(float(columns.expected[i])),
             "std": in_figures(float(std[i])),
-            "of the value": _percent(float(relative[i])),
+            "of the value": relative_in_words(relative[i]) if np.isfinite(relative[i]) else "–",
         }
         for i in order
     )
@@ -129,13 +130,6 @@ def _parameter_table(result: Result, columns: _Columns, unit: str) -> Table:
         "with one over the root of the number of samples. Worst known first.",
         folded=True,
     )
-
-
-def _percent(share: float) -> str:
-    """A share of the value; beyond ten times the value the figure says no more."""
-    if not np.isfinite(share):
-        return "–"
-    return f"{100 * share:.3g} %" if share < 10 else "> 1000 %"
 
 
 def _shortened(words: str, longest: int = 120) -> str:

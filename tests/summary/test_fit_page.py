@@ -44,7 +44,7 @@ def test_the_page_is_sound_and_says_what_matters(stored: StoredFit) -> None:
     stored = replace(stored, noise_floor=floor, traces=stored.traces[1:])
     text = Structure(render(Page("f", "", fit_figures(stored), tuple(fit_sections(stored))))).text
     assert f"{stored.error.mean_relative:.2%}" in text
-    assert "Held-out: r3" in text
+    assert "r3 took no part in the fit" in text
     assert stored.closed_loop_bias[1:] in text
     for name in stored.fit.names:
         assert name in text
