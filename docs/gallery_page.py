@@ -8,10 +8,14 @@ from excite_cli.diagnosis.answer_words import answer_in_words
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.diagnosis.words import approximation_in_words, ends_in_words, rests_in_words
 from excite_cli.measurement.dataset import Dataset
-from excite_cli.shown.answer import Command, Part, Table
-from excite_cli.summary.diagnosis import absorbed_parts
+from excite_cli.shown.answer import Command, Detail, Part, Table
 from excite_cli.summary.error_by_joint import error_tables
-from excite_cli.summary.named_effects import approximation_parts, effect_parts, friction_table
+from excite_cli.summary.named_effects import (
+    absorbed_parts,
+    approximation_parts,
+    effect_parts,
+    friction_table,
+)
 
 HEAD = "---\nhide: [toc]\n---\n\n<!-- Made by `python -m docs.make_gallery`; edit nothing here. -->"
 # Figures of the first answer, and of the others; torque in time has one for each held-out run.
@@ -107,8 +111,10 @@ def _residual(first: Diagnosed) -> list[str]:
 
 def _names(first: Diagnosed) -> list[str]:
     found = first.found
-    parts: list[Part] = [*(effect_parts(found, False) if found.named else ["No effect is named."])]
-    parts += approximation_parts(found, verbose=False)
+    parts: list[Part] = [
+        *(effect_parts(found, Detail.BRIEF) if found.named else ["No effect is named."])
+    ]
+    parts += approximation_parts(found, Detail.BRIEF)
     parts += [friction_table(found.friction_lines)] if found.friction_lines else []
     tables = [part for part in parts if isinstance(part, Table)]
     small = [
@@ -137,7 +143,7 @@ def _after(first: Diagnosed) -> list[str]:
 
 def _errors(found: Diagnosis) -> Table:
     """The table of errors, without the words on who took them off: a page is narrow."""
-    (table,) = (part for part in error_tables(found, False) if isinstance(part, Table))
+    (table,) = error_tables(found, Detail.BRIEF)
     kept = [k for k, name in enumerate(table.columns) if name not in table.words]
     columns, *rows = (tuple(row[k] for k in kept) for row in (table.columns, *table.rows))
     return replace(table, columns=columns, rows=tuple(rows), words=())
@@ -185,7 +191,7 @@ def _otherwise(each: Diagnosed) -> list[str]:
         f"## {escaped(each.words[:1].upper() + each.words[1:])}",
         as_markdown(each.command),
         *_answer(each),
-        *(map(as_markdown, effect_parts(found, False)[:1]) if found.named else ()),
+        *(map(as_markdown, effect_parts(found, Detail.BRIEF)[:1]) if found.named else ()),
         *_pictures(each, "effects_1", "Evidence of the largest effects, one by one"),
         as_markdown(_errors(found)),
         *_pictures(each, "errors", "Errors of every joint before and after"),

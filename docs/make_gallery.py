@@ -19,7 +19,6 @@ from benchmarks.real_robots import DATA, LOGS, Answer, Log, diagnosed, row, tabl
 from docs.gallery_page import HEAD, IN_FULL, OTHERWISE, Diagnosed, page
 from excite_cli import Diagnosis, load_case, load_data, read_diagnosis
 from excite_cli.diagnosis.next_motion import next_experiment
-from excite_cli.report.diagnosis_figures import figures_of
 from excite_cli.report.style import (
     BLUE,
     FORBIDDEN,
@@ -32,6 +31,7 @@ from excite_cli.report.style import (
 )
 from excite_cli.shown.answer import Command
 from excite_cli.summary.diagnosis_data import diagnosis_data
+from excite_cli.summary.figures import diagnosis_figures
 
 TARGET = Path(__file__).parent / "gallery"
 ROBOTS = tuple(dict.fromkeys(log.folder for log in LOGS))
@@ -92,7 +92,7 @@ def written(robot: str, kept: Path, target: Path) -> list[tuple[str, ...]]:
 def drawn(found: Diagnosis, kinds: Sequence[str], target: Path) -> dict[str, str]:
     """Write figures of a diagnosis as small PNGs beside `target`; their names by figure."""
     names = {}
-    for figure, draw in figures_of(found).items():
+    for figure, draw in diagnosis_figures(found).items():
         if not figure.startswith(tuple(kinds)):
             continue
         path = target.with_name(f"{target.name}-{figure}.png")

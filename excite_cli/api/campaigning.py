@@ -39,12 +39,11 @@ from excite_cli.config.spec import Spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.invariant import invariants
 from excite_cli.report.page import render
-from excite_cli.report.rounds_page import rounds_page
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.store.own_file import versions
 from excite_cli.summary.campaign import campaign_answer as campaign_answer
-from excite_cli.summary.campaign import round_in_words
+from excite_cli.summary.campaign import round_in_words, rounds_page
 from excite_cli.summary.named_effects import what_and_where
 from excite_cli.workers.base import Workers
 

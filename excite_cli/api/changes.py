@@ -10,12 +10,12 @@ from excite_cli.api.paths import page_path
 from excite_cli.atomic import write_text_atomically
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.report.page import render
-from excite_cli.report.trend_page import trend_page
 from excite_cli.scoring.changes import Changes, Snapshot, changes_of, of_diagnosis, of_fit, of_score
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis
 from excite_cli.store.fit_file import is_fit, read_fit
 from excite_cli.store.score_file import is_score, read_score
 from excite_cli.summary.changes import changes_answer as changes_answer
+from excite_cli.summary.changes import trend_page
 
 
 @checked()

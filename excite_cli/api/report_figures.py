@@ -16,9 +16,6 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.identification.stored_model import StoredFit
-from excite_cli.report.condition_figure import draw_condition_numbers, draw_spectrum
-from excite_cli.report.diagnosis_figures import figures_of
-from excite_cli.report.motion_figure import draw_margins, draw_motion, watched_constraints
 from excite_cli.report.style import save_figure, save_pages
 from excite_cli.scoring.records import Score
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis
@@ -26,6 +23,7 @@ from excite_cli.store.fit_file import is_fit, read_fit
 from excite_cli.store.own_file import PROGRAM
 from excite_cli.store.result_file import read_result
 from excite_cli.store.score_file import is_score, read_score
+from excite_cli.summary.figures import diagnosis_figures, result_figures
 
 # Files of any kind for one report: told apart by what they hold, in the order of the loop.
 
@@ -122,9 +120,9 @@ def write_figures(
     for each in told:
         own: dict[str, Callable[[], Any]] = {}
         if isinstance(each.content, Result):
-            own = _figures(each.content, problems[each.path])
+            own = result_figures(each.content, problems[each.path])
         elif isinstance(each.content, Diagnosis):
-            own = figures_of(each.content)
+            own = diagnosis_figures(each.content)
         prefix = f"{each.path.stem}_" if kinds[type(each.content)] > 1 else ""
         figures |= {f"{prefix}{name}": draw for name, draw in own.items()}
     if not figures:
@@ -191,16 +189,3 @@ def _refuse_present(paths: list[Path]) -> None:
             f"{present[0]} exists already. Give another place with --figures, or replace it with "
             "--overwrite."
         )
-
-
-def _figures(result: Result, problem: Problem) -> dict[str, Callable[[], Any]]:
-    """What draws each figure, by its name, in reading order."""
-    figures: dict[str, Callable[[], Any]] = {
-        "condition_numbers": partial(draw_condition_numbers, result),
-        "spectrum": partial(draw_spectrum, result, problem),
-    }
-    for motion in result.motions:
-        figures[f"motion_{motion.index}"] = partial(draw_motion, motion, problem)
-        if watched_constraints(problem):
-            figures[f"margins_{motion.index}"] = partial(draw_margins, motion, problem)
-    return figures

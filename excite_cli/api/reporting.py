@@ -13,10 +13,10 @@ from excite_cli.atomic import write_text_atomically
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
-from excite_cli.report.assembly import Source, page_of
 from excite_cli.report.page import render
 from excite_cli.report.style import matplotlib_part
 from excite_cli.shown.answer import Answer
+from excite_cli.summary.assembly import Source, page_of
 from excite_cli.summary.pairs import doubts_in_words
 
 FIGURE_FORMATS = ("png", "svg", "pdf")

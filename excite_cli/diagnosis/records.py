@@ -11,7 +11,7 @@ from excite_cli.diagnosis.traces import Traces
 from excite_cli.diagnosis.verdict import HeldOutVerdict, Verdict
 from excite_cli.effects.base import Value
 from excite_cli.effects.catalogue import catalogue
-from excite_cli.fields import shape
+from excite_cli.fields import PUBLIC, shape
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.measurement.campaign_clock import Recorded
@@ -275,34 +275,39 @@ class Diagnosis(Shown):
     base_names: Annotated[tuple[str, ...], shape("r")]
     declared: tuple[EffectRecord, ...]
     effects: tuple[NamedEffect, ...]
-    absorbed: tuple[ConfoundedCandidate, ...]
+    absorbed: Annotated[tuple[ConfoundedCandidate, ...], PUBLIC]
     held_out_run: str
     before: Errors
     after: Errors
-    rounds: tuple[Round, ...]
-    findings: tuple[Finding, ...]
-    processing: dict[str, Any]
+    rounds: Annotated[tuple[Round, ...], PUBLIC]
+    findings: Annotated[tuple[Finding, ...], PUBLIC]
+    processing: Annotated[dict[str, Any], PUBLIC]
     phi: Annotated[Array, shape("P", finite=True)]
     base_values: Annotated[Array, shape("r")]
     base_std: Annotated[Array, shape("r")]
     information: Information
     versions: dict[str, str]
-    seconds: float = 0.0
-    noise_floor: dict[str, float] | None = None
+    seconds: Annotated[float, PUBLIC] = 0.0
+    noise_floor: Annotated[dict[str, float] | None, PUBLIC] = None
     traces: Traces | None = None
     held_out_traces: tuple[TorqueTrace, ...] = ()
-    assumed: tuple[Assumption, ...] = ()
+    assumed: Annotated[tuple[Assumption, ...], PUBLIC] = ()
     parts: tuple[HeldOutEnds, ...] = ()
     untouched: Errors | None = None
     textbook: Textbook | None = None
-    excess_residuals: tuple[ExcessResidual, ...] = ()
+    excess_residuals: Annotated[tuple[ExcessResidual, ...], PUBLIC] = ()
     joint_aliases: tuple[JointAlias, ...] = ()
-    friction_lines: tuple[FrictionLine, ...] = ()
+    friction_lines: Annotated[tuple[FrictionLine, ...], PUBLIC] = ()
     inertia_parts: dict[str, float] = field(default_factory=dict)
     inertia_names: tuple[str, ...] = ()
     trained: Errors | None = None
     skeleton: Skeleton | None = None
     recorded: Recorded = field(default_factory=Recorded)
+
+    @property
+    def torque_units(self) -> tuple[str, ...]:
+        """N·m of joints that turn, N of those that slide; empty texts where no torque was kept."""
+        return self.traces.torque_units if self.traces else ("",) * len(self.joint_names)
 
     @property
     def baseline(self) -> Errors:

@@ -1,7 +1,6 @@
 """A diagnosis in words, the same ones wherever it is reported."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from operator import attrgetter
+from collections.abc import Iterable, Iterator, Sequence
 
 from excite_cli.diagnosis.covariate import Aspect, Covariate, Source
 from excite_cli.diagnosis.records import (
@@ -97,7 +96,6 @@ _PERHAPS = (
     ),
     ("Residual at velocity reversals", "samples at reversals are excluded from the fit (stiction)"),
 )
-in_symbols = attrgetter("code")  # what a residual depends on, briefly: `q[elbow]`
 _QUANTITIES: dict[Source, str] = {
     "time": "time",
     "run": "the run",
@@ -186,24 +184,18 @@ def covariate_in_words(covariate: Covariate) -> str:
     return f"{words} and direction" if covariate.aspect is Aspect.DIRECTION else words
 
 
-def approximation_in_words(
-    found: Approximation, say: Callable[[Covariate], str] = in_symbols
-) -> str:
-    """What an effect only comes near; covariates as `say` puts them."""
+def approximation_in_words(found: Approximation) -> str:
+    """What an effect only comes near."""
     if found.covariates:
-        return f"a function of {', '.join(map(say, found.covariates))}"
+        return f"a function of {', '.join(each.code for each in found.covariates)}"
     if not found.kind:
         return "explained only in part"
     return f"resembles {title_of(found.kind)}"
 
 
-def rests_in_words(
-    found: Diagnosis, say: Callable[[Covariate], str] = in_symbols
-) -> tuple[list[str], list[str]]:
+def rests_in_words(found: Diagnosis) -> tuple[list[str], list[str]]:
     """What is left beside the noise: sentences on what surely is more, and on what may be."""
-    # Files of earlier versions do not say whether joints slide, nor what is left.
-    known = found.traces.torque_units if found.traces else ("",) * len(found.joint_names)
-    units = dict(zip(found.joint_names, known, strict=True))
+    units = dict(zip(found.joint_names, found.torque_units, strict=True))
     more: list[str] = []
     perhaps: dict[tuple[str, str], list[str]] = {each: [] for each in _PERHAPS}
     for rest in found.excess_residuals:
@@ -215,7 +207,7 @@ def rests_in_words(
             noise = (
                 "" if rest.noise is None else f", noise {rest.noise:.3g}{_unit(units[rest.joint])}"
             )
-            more.append(f"Residual above noise: {left}{noise}; {_predicted(rest, say)}.")
+            more.append(f"Residual above noise: {left}{noise}; {_predicted(rest)}.")
         else:
             why = 2 if rest.at_reversals else int(rest.noise is None)
             perhaps[_PERHAPS[why]].append(left)
@@ -227,10 +219,10 @@ def _unit(unit: str) -> str:
     return f" {unit}" if unit else ""
 
 
-def _predicted(rest: ExcessResidual, say: Callable[[Covariate], str]) -> str:
+def _predicted(rest: ExcessResidual) -> str:
     share = f"{rest.predictable:.0%} of its variance is predictable"
     if rest.depends_on:
-        best = " and ".join(map(say, rest.depends_on))
+        best = " and ".join(each.code for each in rest.depends_on)
         return f"{share}, best from {best}; no effect of the catalogue has this form"
     if rest.predictable > _TELLING:
         return f"{share}, but not from one or two quantities"
@@ -338,16 +330,6 @@ def _textbook_is_better(found: Diagnosis) -> str:
         f"{', '.join(kinds) or 'nothing added'} on every joint, "
         f"{found.after.mean_relative_moving:.2%} with the effects found (mean over joints, where "
         "they move)."
-    )
-
-
-def untouched_in_words(found: Diagnosis) -> str:
-    """What the URDF says of the held-out data by itself; empty where that is not known."""
-    if found.untouched is None:
-        return ""
-    return (
-        "The URDF as given, with the friction of its <dynamics> and nothing fitted: "
-        f"{found.untouched.mean_relative_moving:.2%}."
     )
 
 

@@ -1,7 +1,7 @@
 """Errors of a predicted torque: per joint, relative and in N·m, with an interval of their mean."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,10 +34,6 @@ class Errors:
     interval: tuple[float, float]
     samples: dict[str, int] = field(default_factory=dict)
     rms_moving: dict[str, float] = field(default_factory=dict)
-
-    def as_data(self) -> dict[str, object]:
-        """Plain values for files and JSON."""
-        return asdict(self)
 
 
 def torque_errors(

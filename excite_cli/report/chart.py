@@ -23,6 +23,14 @@ def side_view(points: Array) -> tuple[Array, Array]:
     return np.stack([across, -up], axis=-1), np.asarray(near)
 
 
+def svg_line(one: Array, two: Array, width: float, colour: str) -> str:
+    """A thick line with round ends, from point to point (2,)."""
+    return (
+        f'<path d="M{one[0]:.1f} {one[1]:.1f}L{two[0]:.1f} {two[1]:.1f}" '
+        f'style="stroke: {colour}; stroke-width: {width:.1f}; stroke-linecap: round"></path>'
+    )
+
+
 Colour = Literal["ink", "muted", "blue", "vermilion", "green", "purple"]
 
 
@@ -48,3 +56,18 @@ def limits_about(values: Iterable[float], share: float = 0.08) -> tuple[float, f
     low, high = min(shown), max(shown)
     room = share * max(high - low, 1e-9 * max(abs(low), abs(high)), 1e-12)
     return low - room, high + room
+
+
+def in_figures(value: float, digits: int = 3) -> str:
+    """A number as people write it: `0.00123`, `5.19`, `12400`, `1.2e+07`; `∞` and `–` beside."""
+    if value != value:  # NaN
+        return "–"
+    if value == 0:
+        return "0"
+    if value in (float("inf"), float("-inf")):
+        return "∞" if value > 0 else "-∞"
+    if not 1e-4 <= abs(value) < 10 ** (digits + 3):
+        return f"{value:.{digits - 1}e}"
+    if abs(value) >= 10 ** (digits - 1):
+        return f"{value:.0f}"
+    return f"{value:#.{digits}g}".rstrip(".")

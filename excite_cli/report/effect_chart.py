@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from excite_cli.diagnosis.traces import EffectTrace
 from excite_cli.report.chart import limits_about
 from excite_cli.report.plot import Curve, Panel, Plot, merged
-from excite_cli.report.residual_section import readable_unit, torque_or_force
+from excite_cli.report.residual_chart import readable_unit, torque_or_force
 from excite_cli.robot.model import Array
 
 PREDICTED = "torque that the effect predicts"
@@ -92,7 +92,7 @@ def cloud_plot(title: str, cloud: Cloud, caption: str = "") -> Plot:
     panel = Panel(
         f"{torque_or_force(unit)} [{unit}]",
         (
-            Curve("left by all else", left, "muted", "dots"),
+            Curve("partial residual", left, "muted", "dots"),
             Curve("median, 80 %", median, "blue", "marks", whiskers[0], whiskers[1]),
             Curve("as predicted" if cloud.diagonal else "fitted law", predicted, "vermilion"),
         ),
@@ -181,7 +181,7 @@ def window_plot(
     panel = Panel(
         f"{torque_or_force(unit)} [{scaled}]",
         (
-            Curve("left by all else", factor * left, "muted", "joined"),
+            Curve("partial residual", factor * left, "muted", "joined"),
             Curve("the effect", factor * own, "vermilion"),
         ),
         height=210,

@@ -1,4 +1,4 @@
-"""One self-contained page: sections of charts, tables and texts → HTML.
+"""One self-contained page: blocks → HTML.
 
 The page needs no network and no other file; style and script lie inside it. It reads on a phone
 and on paper, in light and in dark, and without a script (which only adds choosing and sorting).
@@ -8,99 +8,20 @@ Every text is escaped by the template engine: names come from unchecked files.
 import functools
 import hashlib
 import importlib
-from dataclasses import dataclass
 from importlib import resources
-from typing import Any, get_args
+from typing import Any
 
 from excite_cli.errors import MissingExtraError
 from excite_cli.report.chart import Chart
 from excite_cli.report.plot import Plot
+from excite_cli.shown.answer import Charts, Choice, Command, Fold, Page, Table, Text
 
 _SCRIPTS = ("early.js", "page.js", "uplot/uPlot.iife.min.js", "plot.js")
 
 
-@dataclass(frozen=True)
-class TableBlock:
-    """Rows of texts under `columns`; columns numbered in `right` are aligned as numbers.
-
-    `folded`: shown only when opened. `strong`: numbers of rows to stress. Columns numbered in
-    `wordy` hold sentences and stay wide enough for them.
-    """
-
-    columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    title: str = ""
-    right: frozenset[int] = frozenset()
-    note: str = ""
-    folded: bool = False
-    strong: frozenset[int] = frozenset()
-    wordy: frozenset[int] = frozenset()
-
-
-@dataclass(frozen=True)
-class Text:
-    """A paragraph; `kind` is `plain`, `good`, `bad` or `code`."""
-
-    text: str
-    kind: str = "plain"
-
-
-@dataclass(frozen=True)
-class Charts:
-    """Charts side by side, as many as fit."""
-
-    charts: tuple[Chart | Plot, ...]
-    title: str = ""
-
-
-@dataclass(frozen=True)
-class Fold:
-    """Blocks behind a line that opens them."""
-
-    summary: str
-    blocks: tuple["Block", ...]
-
-
-@dataclass(frozen=True)
-class ChoiceBlock:
-    """Alternatives of which one is shown: a motion, a joint. On paper all are printed."""
-
-    label: str
-    options: tuple[tuple[str, tuple["Block", ...]], ...]
-
-
-Block = Chart | Plot | Charts | TableBlock | Text | Fold | ChoiceBlock
-_KINDS = {kind.__name__: kind for kind in get_args(Block)}
-
-
-@dataclass(frozen=True)
-class PageSection:
-    """A part of the page with an entry in its table of contents; `lead` is its finding."""
-
-    anchor: str
-    title: str
-    blocks: tuple[Block, ...]
-    lead: str = ""
-
-
-@dataclass(frozen=True)
-class KeyFigure:
-    """A figure that sums up the page: what it is, its value with unit, and a remark."""
-
-    name: str
-    value: str
-    remark: str = ""
-
-
-@dataclass(frozen=True)
-class Page:
-    """What a report says, ready to be written; `answers` stand before all else."""
-
-    title: str
-    subtitle: str
-    figures: tuple[KeyFigure, ...]
-    sections: tuple[PageSection, ...]
-    answers: tuple[Text, ...] = ()
+_KINDS: dict[str, type] = {
+    each.__name__: each for each in (Chart, Plot, Charts, Choice, Command, Fold, Table, Text, str)
+}
 
 
 def render(page: Page) -> str:
@@ -136,7 +57,8 @@ def _environment() -> Any:
     environment.globals["asset"] = lambda name: safe(_asset(name))
     environment.filters["drawing"] = lambda chart: safe(chart.svg)
     environment.filters["sentence"] = _sentence
-    environment.tests["of_kind"] = lambda block, name: type(block) is _KINDS[name]
+    environment.filters["lines"] = _lines
+    environment.tests["of_kind"] = lambda block, name: isinstance(block, _KINDS[name])
     return environment
 
 
@@ -166,6 +88,12 @@ def _sentence(text: str) -> Any:
     return markup.Markup("").join(
         code.format(part) if number % 2 else part for number, part in enumerate(parts)
     )
+
+
+def _lines(text: str) -> Any:
+    """Escaped text with its ends of lines."""
+    markup = importlib.import_module("markupsafe")
+    return markup.Markup("<br>").join(text.split("\n"))
 
 
 def _base64(data: bytes) -> str:

@@ -6,7 +6,7 @@ from math import isfinite
 
 import numpy as np
 
-from excite_cli.report.chart import Chart, side_view
+from excite_cli.report.chart import Chart, side_view, svg_line
 from excite_cli.robot.model import Array
 from excite_cli.robot.tree import Skeleton
 
@@ -29,14 +29,14 @@ def robot_chart(
     points, base, tips = _placed(skeleton, height)
     parts = [f'<svg viewBox="0 0 {_WIDTH:g} {height:g}">']
     for j, parent in enumerate(skeleton.parents):
-        parts.append(_line(base if parent < 0 else points[parent], points[j], "ink", 3.0))
-        parts.append(_line(points[j], tips[j], "ink", 3.0))
+        parts.append(svg_line(base if parent < 0 else points[parent], points[j], 3.0, "var(--ink)"))
+        parts.append(svg_line(points[j], tips[j], 3.0, "var(--ink)"))
     rows = np.argsort(points[:, 1], kind="stable")
     left = _WIDTH * _ROBOT + 6.0
     step = (height - 2 * _MARGIN) / max(len(names), 1)
     for row, j in enumerate(rows):
         y = _MARGIN + (row + 0.5) * step
-        parts.append(_line(points[j], np.array([left, y]), "grid", 0.8))
+        parts.append(svg_line(points[j], np.array([left, y]), 0.8, "var(--grid)"))
         share = known.get(names[j])
         told = "–" if share is None else f"{share:.1%}"
         parts.append(
@@ -60,13 +60,6 @@ def _colour(share: float | None, most: float) -> str:
     if share is None:
         return "var(--muted)"
     return f"color-mix(in oklab, var(--vermilion) {100 * share / most:.0f}%, var(--green))"
-
-
-def _line(one: Array, two: Array, colour: str, width: float) -> str:
-    return (
-        f'<path d="M{one[0]:.1f} {one[1]:.1f}L{two[0]:.1f} {two[1]:.1f}" '
-        f'style="stroke: var(--{colour}); stroke-width: {width:g}; stroke-linecap: round"></path>'
-    )
 
 
 def _placed(skeleton: Skeleton, height: float) -> tuple[Array, Array, Array]:

@@ -55,6 +55,14 @@ class Row:
 
 
 @dataclass(frozen=True)
+class RowsChart(Chart):
+    """A drawing of rows, with what it was drawn of."""
+
+    axis: "Axis" = field(kw_only=True)
+    rows: tuple[Row, ...] = field(kw_only=True)
+
+
+@dataclass(frozen=True)
 class Axis:
     """From `low` to `high`: linear, logarithmic, or that to both sides of ±`linear`."""
 
@@ -121,7 +129,7 @@ def rows_chart(
     rows: Sequence[Row],
     caption: str = "",
     noted: str = "",
-) -> Chart:
+) -> RowsChart:
     """The rows from above downwards; `noted` is the heading of the notes."""
     left = min(_MOST_NAME, _LETTER * max((len(row.name) for row in rows), default=0) + _EDGE)
     right = _WIDTH - _EDGE - (_NOTE if any(row.note for row in rows) else 0.0)
@@ -156,7 +164,8 @@ def rows_chart(
             parts.append(_drawn(mark, at(mark.x), y, told))
         if row.note:
             parts.append(_text(right + 3, y + 3, row.note, "start"))
-    return Chart(title, "".join([*parts, *legend, "</svg>"]), alternative, caption)
+    svg = "".join([*parts, *legend, "</svg>"])
+    return RowsChart(title, svg, alternative, caption, axis=axis, rows=tuple(rows))
 
 
 def _legend(rows: Sequence[Row], top: float) -> tuple[list[str], float]:

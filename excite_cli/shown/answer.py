@@ -1,11 +1,22 @@
-"""The answer of a command, for people and for scripts: tables, sentences, commands to go on with.
+"""What there is to say of a record, in blocks: texts, tables, commands, charts, sections of them.
 
-None of them knows where it is shown: on a terminal, in a notebook, on a page.
+No block knows where it is shown, and whoever shows blocks (a terminal, a notebook, a page) knows
+nothing else. A terminal and a notebook show no charts.
 """
 
 import shlex
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
+from typing import Any, Self
+
+
+class Detail(IntEnum):
+    """How much is said: in an answer, with `--verbose`, on a page."""
+
+    BRIEF = 0
+    VERBOSE = 1
+    PAGE = 2
 
 
 @dataclass(frozen=True)
@@ -32,7 +43,9 @@ class Table:
 
     `left`: columns of names and units, `words`: columns that may wrap where there is little room;
     all others hold figures and are aligned to the right. `bold`: rows by their number. Before the
-    rows of `parted` there is a gap.
+    rows of `parted` there is a gap. `note` explains columns; where a page is shown, a table that is
+    `folded` has to be opened. `shades`: how dark the cells of each row after the first are there,
+    from 0 to 1.
     """
 
     title: str
@@ -42,6 +55,9 @@ class Table:
     words: tuple[str, ...] = ()
     bold: tuple[int, ...] = ()
     parted: tuple[int, ...] = ()
+    note: str = ""
+    folded: bool = False
+    shades: tuple[tuple[float, ...], ...] = ()
 
     def __post_init__(self) -> None:
         """Raise ValueError for a row of another length than the columns, or an unknown column."""
@@ -51,10 +67,118 @@ class Table:
         if unknown:
             raise ValueError(f"'{self.title}' has no columns {sorted(unknown)}")
 
+    @classmethod
+    def of(
+        cls,
+        title: str,
+        rows: Iterable[Mapping[str, str]],
+        left: tuple[str, ...] = (),
+        words: tuple[str, ...] = (),
+        **look: Any,
+    ) -> Self:
+        """A table of rows that have each cell beside the name of its column; others are empty.
 
-# What is shown of a record, in reading order: tables, sentences, commands to go on with.
+        Names in `left` and `words` may be those of columns that are not there.
+        """
+        cells = list(rows)
+        columns = tuple(dict.fromkeys(name for row in cells for name in row))
+        texts = tuple(tuple(row.get(name, "") for name in columns) for row in cells)
+        own_left, own_words = (
+            tuple(name for name in names if name in columns) for names in (left, words)
+        )
+        return cls(title, columns, texts, own_left, own_words, **look)
+
+    def is_left(self, column: str) -> bool:
+        """Whether the cells of a column are aligned to the left."""
+        return column in self.left or column in self.words
+
+
+@dataclass(frozen=True)
+class Text:
+    """A paragraph; `kind` is `plain`, `answer`, `good`, `bad` or `code`."""
+
+    text: str
+    kind: str = "plain"
+
+
+@dataclass(frozen=True)
+class Charts:
+    """Drawings side by side, as many as fit."""
+
+    charts: tuple[Any, ...]
+    title: str = ""
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Blocks behind a line that opens them."""
+
+    summary: str
+    blocks: tuple["Block", ...]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Alternatives of which one is shown: a motion, a joint. On paper all are printed."""
+
+    label: str
+    options: tuple[tuple[str, tuple["Block", ...]], ...]
+
+
+# What an answer has, in reading order: plain texts are texts without a kind.
 Part = Table | Command | str
 Parts = list[Part]
+Block = Part | Text | Charts | Fold | Choice
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a document with an entry in its table of contents; `lead` is its finding.
+
+    Answers have the blocks alone.
+    """
+
+    anchor: str
+    title: str
+    blocks: tuple[Block, ...]
+    lead: str = ""
+
+
+@dataclass(frozen=True)
+class KeyFigure:
+    """A figure that sums up a page: what it is, its value with unit, and a remark."""
+
+    name: str
+    value: str
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class Page:
+    """What a report says, ready to be written; `answers` stand before all else."""
+
+    title: str
+    subtitle: str
+    figures: tuple[KeyFigure, ...]
+    sections: tuple[Section, ...]
+    answers: tuple[Text, ...] = ()
+
+
+def parts_of(sections: Iterable[Section]) -> Parts:
+    """What an answer has of sections: no charts."""
+    return list(_parts(block for section in sections for block in section.blocks))
+
+
+def _parts(blocks: Iterable[Block]) -> Iterator[Part]:
+    for block in blocks:
+        if isinstance(block, Fold):
+            yield from _parts(block.blocks)
+        elif isinstance(block, Choice):
+            yield from (part for _, inner in block.options for part in _parts(inner))
+        elif isinstance(block, Table) and block.note:
+            yield from (replace(block, note=""), block.note)
+        elif not isinstance(block, Charts):
+            yield block.text if isinstance(block, Text) else block
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ def _row(table: Table, number: int, row: tuple[str, ...]) -> list[str]:
 
 
 def _cell(table: Table, tag: str, column: str, text: str) -> str:
-    side = "left" if column in table.left or column in table.words else "right"
+    side = "left" if table.is_left(column) else "right"
     return f'<{tag} style="text-align: {side}">{_text(text)}</{tag}>'
 
 

@@ -22,7 +22,7 @@ from typing import Annotated, Any, TypeVar, Union, get_args, get_origin, get_typ
 import h5py
 import numpy as np
 
-from excite_cli.fields import Shape
+from excite_cli.fields import Shape, data_of
 from excite_cli.store import checked
 
 Record = TypeVar("Record")
@@ -101,19 +101,7 @@ def _field(group: Any, name: str, kind: Any, lengths: Lengths) -> Any:
 
 def as_json(value: Any) -> str:
     """JSON of a record; numbers of NumPy become plain ones, NaN stays NaN."""
-    return json.dumps(_plain(value), ensure_ascii=False)
-
-
-def _plain(value: Any) -> Any:
-    if hasattr(value, "code"):
-        return value.code
-    if is_dataclass(value):
-        return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+    return json.dumps(data_of(value), ensure_ascii=False)
 
 
 def _write_array(group: Any, name: str, array: Any) -> None:

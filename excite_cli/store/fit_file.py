@@ -116,7 +116,7 @@ def _read(file: Any, path: Path) -> StoredFit:
     if len(fit.links) not in (0, len(fit.phi) // 10):
         raise ValueError("'links' are not those of its bodies")
     checked.require_joints(joints, (stored.error, stored.training_error), stored.noise_floor)
-    if len(stored.torque_units) not in (0, len(joints)):
+    if len(stored.torque_units) != len(joints):
         raise ValueError("'torque_units' do not fit its joints")
     return stored
 

@@ -1,10 +1,13 @@
 """The rounds of a campaign, and how it ended, in words."""
 
-from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
+
 from excite_cli.campaign.records import Campaign, CampaignRound, RoundFindings
-from excite_cli.shown.answer import Answer, Part, Table
+from excite_cli.fields import data_of
+from excite_cli.report.plot import Curve, Panel, Plot
+from excite_cli.shown.answer import Answer, Charts, KeyFigure, Page, Part, Section, Table, Text
 from excite_cli.shown.record import show
 
 
@@ -24,45 +27,25 @@ def round_in_words(number: int, learned: RoundFindings) -> str:
 
 def rounds_table(campaign: Campaign) -> Table:
     """A row per round; seconds of motion add up to those of the campaign."""
-    return Table(
-        "Rounds (errors: of the torque on the newest motion, which is held out)",
-        (
-            "round",
-            "motions",
-            "pace",
-            "seconds",
-            "efficiency",
-            "before",
-            "after",
-            "torque std [σ]",
-            "effects",
-        ),
-        tuple(_row(each) for each in campaign.rounds),
-        words=("effects",),
-    )
+    title = "Rounds (errors: of the torque on the newest motion, which is held out)"
+    return Table.of(title, map(_row, campaign.rounds), words=("effects",))
 
 
-def _row(each: CampaignRound) -> tuple[str, ...]:
+def _row(each: CampaignRound) -> dict[str, str]:
     learned = each.learned
-    pace = f"{min(m.pace for m in each.motions):.0%}"
-    seconds = f"{sum(m.seconds for m in each.motions if m.data):.0f}"
-    measured = sum(bool(m.data) for m in each.motions)
-    count = str(measured) if measured == len(each.motions) else f"{measured} of {len(each.motions)}"
-    efficiency = "" if each.efficiency is None else f"{each.efficiency:.2%}"
-    if learned is None:
-        return str(each.number), count, pace, seconds, efficiency, *[""] * 4
-    known = learned.torque_deviation
-    return (
-        str(each.number),
-        count,
-        pace,
-        seconds,
-        efficiency,
-        f"{learned.before:.2%}",
-        f"{learned.after:.2%}",
-        "" if known is None else f"{known:.2g}",
-        ", ".join(learned.effects),
-    )
+    measured, every = sum(bool(m.data) for m in each.motions), len(each.motions)
+    known = learned and learned.torque_deviation
+    return {
+        "round": str(each.number),
+        "motions": str(measured) if measured == every else f"{measured} of {every}",
+        "pace": f"{min(m.pace for m in each.motions):.0%}",
+        "seconds": f"{sum(m.seconds for m in each.motions if m.data):.0f}",
+        "efficiency": "" if each.efficiency is None else f"{each.efficiency:.2%}",
+        "declared": f"{learned.before:.2%}" if learned else "",
+        "with effects": f"{learned.after:.2%}" if learned else "",
+        "torque std [σ]": "" if known is None else f"{known:.2g}",
+        "effects": ", ".join(learned.effects) if learned else "",
+    }
 
 
 def campaign_answer(campaign: Campaign, folder: Path, written: dict[str, str]) -> Answer:
@@ -77,7 +60,7 @@ def campaign_answer(campaign: Campaign, folder: Path, written: dict[str, str]) -
     data = {
         "ended": campaign.ended,
         "reason": campaign.reason,
-        "rounds": [asdict(each) for each in campaign.rounds],
+        "rounds": data_of(campaign.rounds),
         "motions": count,
         "seconds": campaign.seconds,
         "folder": str(folder),
@@ -86,6 +69,109 @@ def campaign_answer(campaign: Campaign, folder: Path, written: dict[str, str]) -
     table = rounds_table(campaign)
     parts: tuple[Part, ...] = (campaign.reason, table, total, *files)
     return Answer(parts, data, good=campaign.ended == "complete")
+
+
+# The page, which grows with the rounds.
+
+
+def rounds_page(campaign: Campaign, robot: str) -> Page:
+    """Error, effects, precision and motion time of every round so far, and what is open."""
+    done = [each for each in campaign.rounds if each.learned is not None]
+    told = (
+        campaign.reason or f"Round {campaign.rounds[-1].number if campaign.rounds else 1} goes on."
+    )
+    kind = {"complete": "good", "": "plain"}.get(campaign.ended, "bad")
+    sections = [Section("rounds", "Rounds", (rounds_table(campaign),))]
+    if done:
+        sections.insert(0, Section("errors", "Error and precision", (Charts((_plot(done),)),)))
+        sections.append(_open(done[-1]))
+    sections.append(_motions(campaign))
+    return Page(
+        f"Campaign of {robot}",
+        told,
+        (
+            KeyFigure("rounds", str(len(campaign.rounds))),
+            KeyFigure("motion", f"{campaign.seconds:.0f} s", f"{len(campaign.motions)} motions"),
+            *(_figures(done[-1]) if done else ()),
+        ),
+        tuple(sections),
+        (Text(told, kind),) if campaign.ended else (),
+    )
+
+
+def _figures(last: CampaignRound) -> tuple[KeyFigure, ...]:
+    learned = last.learned
+    assert learned is not None
+    return (
+        KeyFigure(
+            "torque missed",
+            f"{learned.after:.2%}",
+            f"on {last.motions[-1].name}, which took no part; {learned.before:.2%} without effects",
+        ),
+        KeyFigure("effects", str(len(learned.effects)), ", ".join(learned.effects)),
+    )
+
+
+def _plot(done: list[CampaignRound]) -> Plot:
+    """Errors before and after, and the precision of torques, over the motion seconds so far."""
+    learned = [each.learned for each in done if each.learned is not None]
+    numbers = np.array([float(each.number) for each in done])
+    before, after = (
+        np.array([100.0 * getattr(each, name) for each in learned]) for name in ("before", "after")
+    )
+    known = np.array(
+        [np.nan if x.torque_deviation is None else x.torque_deviation for x in learned]
+    )
+    errors = Panel(
+        "held-out error [%]",
+        (
+            Curve("declared model", before, "vermilion", "joined"),
+            Curve("with effects", after, "blue", "joined"),
+        ),
+        height=200,
+        logarithmic=bool((before > 0).all() and (after > 0).all()),
+    )
+    precision = Panel(
+        "torque std [σ]",
+        (Curve("torque deviation", known, "green", "joined"),),
+        height=150,
+    )
+    return Plot(
+        "Rounds",
+        f"Held-out error on the newest motion: {before[-1]:.2f} % of the torque with the declared "
+        f"model, {after[-1]:.2f} % with all effects found, after {len(done)} rounds.",
+        "round",
+        numbers,
+        (errors, precision) if np.isfinite(known).any() else (errors,),
+        caption="Errors are those on the newest motion of each round, which is held out; torque "
+        "std: predicted-torque standard deviation at random states, in σ of one sample.",
+        wide=True,
+        counted=True,
+    )
+
+
+def _open(last: CampaignRound) -> Section:
+    learned = last.learned
+    assert learned is not None
+    lines = tuple(Text(each) for each in learned.open) or (Text("Nothing.", "good"),)
+    return Section("open", "What is open", lines)
+
+
+def _motions(campaign: Campaign) -> Section:
+    rows = (
+        {
+            "motion": each.name,
+            "for": each.purpose,
+            "pace": f"{each.pace:.0%}",
+            "seconds": f"{each.seconds:.1f}" if each.data else "",
+            "log": each.data or "not measured yet",
+            "rejected recordings": "; ".join(each.rejected),
+        }
+        for one in campaign.rounds
+        for each in one.motions
+    )
+    table = Table.of("", rows, left=("motion", "for", "log"), words=("rejected recordings",))
+    return Section("motions", "Motions", (table,))
 
 
 show(

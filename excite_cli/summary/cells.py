@@ -1,7 +1,17 @@
 """Numbers in tables; what is not known is "-"."""
 
-from collections.abc import Mapping
-from math import isnan, nan
+from collections.abc import Iterable, Mapping
+from math import isnan
+from typing import Any
+
+from excite_cli.fields import data_of
+from excite_cli.measurement.dataset import Finding
+
+
+def findings_data(findings: Iterable[Finding]) -> list[dict[str, Any]]:
+    """What was noticed about data, for `--json`."""
+    return [data_of(each, "kind", "severity", "run", "text") for each in findings]
+
 
 # The files that a command has written, told at the end of its answer.
 
@@ -25,20 +35,3 @@ def points(share: float) -> str:
 def figure(value: float) -> str:
     """Four digits."""
     return "-" if isnan(value) else f"{value:.4g}"
-
-
-# The noise floor in tables, for `excite identify` and `excite diagnose`.
-
-COLUMN = "noise floor"
-
-
-def floor_columns(floor: dict[str, float] | None) -> list[str]:
-    """The column's title, if there is one."""
-    return [] if floor is None else [COLUMN]
-
-
-def floor_cells(floor: dict[str, float] | None, joint: str) -> list[str]:
-    """What stands in the column, if there is one."""
-    if floor is None:
-        return []
-    return [figure(floor.get(joint, nan))]

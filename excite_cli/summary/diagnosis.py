@@ -1,43 +1,57 @@
-"""A diagnosis for people (tables and sentences) and for scripts (JSON)."""
+"""The document of a diagnosis, for terminal, notebook and page, and its answer for `--json`."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from excite_cli.diagnosis.answer_words import answer_in_words
 from excite_cli.diagnosis.next_motion import next_command, next_experiment
-from excite_cli.diagnosis.records import (
-    Diagnosis,
-    NamedEffect,
-    Round,
-)
+from excite_cli.diagnosis.records import Diagnosis, EffectRecord, NamedEffect, Round
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.diagnosis.words import (
-    assumption_in_words,
-    changes_in_words,
     counted,
-    ends_in_words,
-    joints_in_words,
+    covariate_in_words,
+    no_gain_in_words,
     p_in_words,
     place_in_words,
     rests_in_words,
-    settled_in_words,
     value_in_words,
 )
-from excite_cli.identification.fit_words import above_the_floor
-from excite_cli.shown.answer import Answer, Command, Parts, Table, as_word
+from excite_cli.report.dependence_chart import dependence_plots
+from excite_cli.report.residual_chart import residuals_in_time
+from excite_cli.shown.answer import (
+    Answer,
+    Block,
+    Charts,
+    Command,
+    Detail,
+    Fold,
+    KeyFigure,
+    Parts,
+    Section,
+    Table,
+    Text,
+    as_word,
+    parts_of,
+)
 from excite_cli.shown.record import show
 from excite_cli.summary.cells import files_in_words
 from excite_cli.summary.diagnosis_data import diagnosis_data
-from excite_cli.summary.error_by_joint import error_tables
+from excite_cli.summary.effect_evidence import evidence_section
+from excite_cli.summary.error_by_joint import errors_section
+from excite_cli.summary.findings import data_blocks
 from excite_cli.summary.named_effects import (
-    approximation_parts,
-    effect_parts,
     effect_table,
-    friction_table,
+    found_section,
     other_names,
     what_and_where,
 )
+
+_WORTH = 0.01  # share of the residual from which on a quantity is told
+_MOST_QUANTITIES = 18
+_OPEN_ROUNDS = 3  # tables of rounds that a page shows without being opened
 
 
 def diagnosis_answer(
@@ -53,7 +67,7 @@ def diagnosis_answer(
     files = {kind: str(path) for kind, path in written.items() if path is not None}
     place = files.get("diagnosis", "DIAGNOSIS.h5")
     experiment = next_experiment(found, config, place)
-    parts = diagnosis_parts(found, verbose)
+    parts = diagnosis_parts(found, Detail(verbose))
     if not verbose:
         rounds = counted(len(found.rounds), "round")
         parts.append(f"({rounds} of tests; --verbose shows the rejected candidates, with reasons.)")
@@ -61,30 +75,204 @@ def diagnosis_answer(
     return Answer(tuple(parts), {**diagnosis_data(found, experiment), "output": files}, found.good)
 
 
-def diagnosis_parts(found: Diagnosis, verbose: bool = False) -> Parts:
+def diagnosis_parts(found: Diagnosis, detail: Detail = Detail.BRIEF) -> Parts:
     """What is missing, absorbed or unexplained, before and after."""
-    parts: Parts = [answer_in_words(found)]
-    if verbose:
-        parts.append(_data_in_words(found))
-        parts += [_round_table(found, each) for each in found.rounds]
-    if found.effects:
-        parts += effect_parts(found, verbose)
-    parts += approximation_parts(found, verbose)
-    parts += [friction_table(found.friction_lines)] if verbose and _has_curves(found) else []
-    parts += changes_in_words(found)
-    parts += absorbed_parts(found)
-    parts += [text for texts in rests_in_words(found) for text in texts]
-    parts += error_tables(found, verbose)
-    above = above_the_floor(found.after, found.noise_floor)
-    parts += [above] if above else []
-    parts += [ends_in_words(part) for part in found.parts]
-    parts += [f"Assumed: {assumption_in_words(each)}" for each in found.assumed]
-    parts.append(_verdict(found))
-    return parts
+    sections = diagnosis_sections(found, detail)
+    # The search goes first, so that its result is what one sees last.
+    order = {"diagnosis-data": -2, "diagnosis-candidates": -1, "diagnosis-errors": 1}
+    sections.sort(key=lambda each: order.get(each.anchor, 0))
+    return [answer_in_words(found), *parts_of(sections)]
 
 
-def _has_curves(found: Diagnosis) -> bool:
-    return any(line.curved for line in found.friction_lines)
+def diagnosis_sections(found: Diagnosis, detail: Detail = Detail.PAGE) -> list[Section]:
+    """Those that have something to say, in the order of a page."""
+    every = [make(found, detail) for make in SECTIONS]
+    return [section for section in every if section.blocks]
+
+
+def diagnosis_figures(found: Diagnosis) -> tuple[KeyFigure, ...]:
+    """What sums a diagnosis up."""
+    low, high = found.after.interval
+    kinds = list(dict.fromkeys(each.effect.kind for each in found.named))
+    listed = ", ".join(kinds[:3]) + (" …" if len(kinds) > 3 else "")
+    open_questions = sum(bool(each.aliases) for each in found.effects)
+    warned = [each for each in found.findings if each.severity == "warning"]
+    warnings = ", ".join(dict.fromkeys(each.kind.replace("_", " ") for each in warned))
+    bad = KeyFigure("verdict", "the held-out error did not fall", no_gain_in_words(found))
+    return (
+        *([] if found.good else [bad]),
+        KeyFigure(
+            "error on held-out data, moving",
+            f"{found.before.mean_relative_moving:.2%} → {found.after.mean_relative_moving:.2%}",
+            f"all samples {found.after.mean_relative:.2%}, 95% interval {low:.2%} to {high:.2%}",
+        ),
+        KeyFigure("effects found", str(len(found.named)), listed or _none(found)),
+        KeyFigure(
+            "not distinguished",
+            str(open_questions),
+            "effects with indistinguishable alternatives"
+            if open_questions
+            else "every effect is unique",
+        ),
+        KeyFigure(
+            "unexplained",
+            counted(len(found.joints_with_residual), "joint"),
+            ", ".join(found.joints_with_residual) or "the residual behaves like noise",
+        ),
+        KeyFigure(
+            "about the data",
+            counted(len(warned), "warning"),
+            f"{warnings}: see Data and choices" if warned else "taken as recorded",
+        ),
+    )
+
+
+def _none(found: Diagnosis) -> str:
+    return "nothing is missing" if found.complete else "unexplained residual"
+
+
+def _time_section(found: Diagnosis, detail: Detail) -> Section:
+    blocks: tuple[Block, ...] = ()
+    if detail == Detail.PAGE and found.traces is not None:
+        traces = (*found.held_out_traces, *found.traces.runs)
+        blocks = residuals_in_time(traces, found.joint_names, found.torque_units)
+    lead = (
+        "Filtered torque, as used in the fit. Above: measured torque and prediction of the model "
+        "with all effects; below: residuals of this and of the declared model. Shaded: held out."
+    )
+    return Section("diagnosis-time", "Residual in time", blocks, lead)
+
+
+def _unexplained_section(found: Diagnosis, detail: Detail) -> Section:
+    more, perhaps = rests_in_words(found)
+    blocks: list[Block] = [*(Text(text, "bad") for text in more), *perhaps]
+    if detail == Detail.PAGE:
+        if not blocks:
+            none = "The residual depends significantly on no quantity: it behaves like noise."
+            blocks.append(Text(none, "good"))
+        blocks += _dependences(found)
+    lead = (
+        "After all effects are in, is what remains of the torque still a function of something? "
+        "Every joint's residual is tried against time, angles, speeds and accelerations of all "
+        "joints, and its own load, direction and history."
+    )
+    return Section("diagnosis-unexplained", "Unexplained residual", tuple(blocks), lead)
+
+
+def _dependences(found: Diagnosis) -> list[Block]:
+    """What is left over what it depends on most, and the share that each quantity explains."""
+    if found.traces is None:
+        return []
+    dependence = found.traces.dependence
+    most = dependence.shares.max(axis=0)
+    kept = [
+        int(k) for k in np.argsort(-most, kind="stable")[:_MOST_QUANTITIES] if most[k] >= _WORTH
+    ]
+    shares = dependence.shares[:, kept].T
+    rows = (
+        {
+            "quantity": covariate_in_words(dependence.quantities[k]),
+            **{
+                joint: f"{100 * share:.0f}" if share >= _WORTH / 2 else ""
+                for joint, share in zip(dependence.joints, own, strict=True)
+            },
+        }
+        for k, own in zip(kept, shares, strict=True)
+    )
+    table = Table.of(
+        "Share of the residual that one quantity explains [%]",
+        rows,
+        left=("quantity",),
+        note="Columns: the joint of the residual. Shares are cross-validated over runs; shares "
+        "overlap, since quantities of one motion correlate. The sentences above name the "
+        "significant ones.",
+        shades=tuple(map(tuple, shares.tolist())),
+    )
+    none = (
+        f"No smooth function of a single quantity predicts {_WORTH:.0%} or more of the residual of "
+        "any joint that runs left out confirm."
+    )
+    pictures = dependence_plots(found, found.traces)
+    title = "Residual over the quantities on which the residual depends"
+    return [*([Charts(pictures, title)] if pictures else []), table if kept else none]
+
+
+def _candidates_section(found: Diagnosis, detail: Detail) -> Section:
+    """A table for every round."""
+    tables = [_round_table(found, each) for each in found.rounds] if detail else []
+    blocks: tuple[Block, ...] = tuple(tables)
+    if later := blocks[_OPEN_ROUNDS:]:
+        first = _OPEN_ROUNDS + 1
+        words = f"round {first}" if len(later) == 1 else f"rounds {first} to {len(tables)}"
+        folded = Fold(f"The other {counted(len(later), 'round')}: {words}", later)
+        blocks = (*blocks[:_OPEN_ROUNDS], folded)
+    lead = (
+        "Every round judges all candidates beside what was found before and takes the one that "
+        "saves most. Shown are the strongest candidates and the verdict on each: the p-value is "
+        "corrected for the number of tests; the share is of the residual at that point; the gain "
+        "is by how much the error on runs left out falls. One that is refused now may be accepted "
+        "in a later round."
+    )
+    return Section("diagnosis-candidates", "Rejected candidates, with reasons", blocks, lead)
+
+
+def _round_table(found: Diagnosis, each: Round) -> Table:
+    worst = max(each.residual, key=lambda joint: each.residual[joint])
+    unit = dict(zip(found.joint_names, found.torque_units, strict=True)).get(worst, "")
+    rows = (
+        {
+            "candidate": suspect.effect.kind,
+            "where": place_in_words(suspect.effect, len(found.joint_names)),
+            "p": p_in_words(suspect.p_value, suspect.least_p),
+            "of residual": f"{suspect.share_of_residual:.1%}",
+            "gain on data left out": f"{suspect.gain:.1%}",
+            "verdict": f"{suspect.verdict}: {suspect.why}" if suspect.why else suspect.verdict,
+        }
+        for suspect in each.suspects
+    )
+    return Table.of(
+        f"Round {each.index}: largest residual {each.residual[worst]:.3g} {unit} RMS ({worst}); "
+        f"{each.verdict} (p: of it alone; sets are judged together)",
+        rows,
+        words=("candidate", "where", "verdict"),
+        bold=tuple(k for k, each in enumerate(each.suspects) if each.verdict is Verdict.ACCEPTED),
+    )
+
+
+def _next_section(found: Diagnosis, detail: Detail) -> Section:
+    """On a page; an answer has the names of files to say it with."""
+    experiment = next_experiment(found)
+    lead = f"Next: plan a motion, to {_purpose(experiment)}."
+    if detail < Detail.PAGE:
+        return Section("diagnosis-next", "Next motion", (), lead)
+    rows = tuple(
+        tuple(f"{each['kind']} on {', '.join(each['joints'])}" for each in pair.values())
+        for pair in experiment["pairs"]
+    )
+    names = ("found", "indistinguishable from")
+    table = (Table("", names, rows, left=names),) if rows else ()
+    command = next_command("CONFIG", "DIAGNOSIS.h5")
+    return Section("diagnosis-next", "Next motion", (*table, command), lead)
+
+
+def _purpose(experiment: Mapping[str, Any]) -> str:
+    if experiment["purpose"] == "separate":
+        return f"distinguish {counted(len(experiment['pairs']), 'pair')} of effects"
+    return "excite the model with what was found"
+
+
+def _data_section(found: Diagnosis, detail: Detail) -> Section:
+    blocks: list[Block] = []
+    if detail == Detail.VERBOSE:
+        blocks.append(_data_in_words(found))
+    if detail == Detail.PAGE:
+        blocks += data_blocks(found, found.joint_names, _runs(found))
+        blocks.append(f"{found.seconds:.1f} s.")
+    lead = (
+        "To go on with the extended model, `excite diagnose … --apply NEW.yaml` writes this "
+        "configuration with the effects that were found."
+    )
+    return Section("diagnosis-data", "Data and choices", tuple(blocks), lead)
 
 
 def _data_in_words(found: Diagnosis) -> str:
@@ -100,63 +288,48 @@ def _data_in_words(found: Diagnosis) -> str:
     )
 
 
-def _round_table(found: Diagnosis, each: Round) -> Table:
-    worst = max(each.residual, key=lambda joint: each.residual[joint])
-    units = found.traces.torque_units if found.traces else ("",) * len(found.joint_names)
-    unit = dict(zip(found.joint_names, units, strict=True)).get(worst, "")
-    rows = tuple(
-        (
-            suspect.effect.kind,
-            place_in_words(suspect.effect, len(found.joint_names)),
-            p_in_words(suspect.p_value, suspect.least_p),
-            f"{suspect.share_of_residual:.1%}",
-            f"{suspect.gain:.1%}",
-            f"{suspect.verdict}: {suspect.why}" if suspect.why else suspect.verdict,
-        )
-        for suspect in each.suspects
-    )
-    return Table(
-        f"Round {each.index}: largest residual {each.residual[worst]:.3g} {unit} RMS ({worst}); "
-        f"{each.verdict} (p: of it alone; sets are judged together)",
-        ("candidate", "where", "p", "of residual", "gain on data left out", "verdict"),
-        rows,
-        words=("candidate", "where", "verdict"),
-        bold=tuple(k for k, each in enumerate(each.suspects) if each.verdict is Verdict.ACCEPTED),
-    )
-
-
-def absorbed_parts(found: Diagnosis) -> Parts:
-    """Candidates that would show as other values of parameters: a table, if there are any."""
-    if not found.absorbed:
+def _runs(found: Diagnosis) -> list[Table]:
+    """Every run, what it was for, and what is there in it and not in all others."""
+    names = [str(each) for each in found.processing.get("runs", ())]
+    if len(names) < 2:
         return []
+    effects = [each.effect for each in found.effects]
+    every = (*found.declared, *effects)
+    uses = (*((name, "training") for name in names), (found.held_out_run, "held-out"))
     rows = tuple(
-        (
-            each.kind,
-            joints_in_words(each.joints, len(found.joint_names)),
-            ", ".join(each.by),
-        )
-        for each in found.absorbed
+        (name, use, ", ".join(_own(each) for each in every if _within(name, each.runs)) or "–")
+        for name, use in uses
     )
-    table = Table(
-        "Not identifiable: confounded with parameters of the model",
-        ("effect", "where", "confounded with"),
-        rows,
-        left=("effect", "where"),
-        words=("confounded with",),
+    note = (
+        "Effects of single runs that are found are never looked for in the held-out one."
+        if any(each.runs for each in effects)
+        else ""
     )
-    return [table, *settled_in_words(found)]
+    columns = ("run", "used as", "in it, not in all")
+    return [Table("Runs", columns, rows, left=columns, note=note)]
 
 
-def _verdict(found: Diagnosis) -> str:
-    low, high = found.after.interval
-    return (
-        f"{counted(len(found.named), 'effect')}"
-        + (f", {counted(len(found.approximations), 'surrogate term')}" * bool(found.approximations))
-        + "; mean held-out error where joints move "
-        f"{found.before.mean_relative_moving:.2%} → {found.after.mean_relative_moving:.2%}; over "
-        f"all samples {found.after.mean_relative:.2%} (its 95% interval {low:.2%} to {high:.2%}). "
-        f"{found.seconds:.1f} s."
+def _within(name: str, runs: Sequence[str]) -> bool:
+    """Whether a run, or a part or the whole of it, is among the runs."""
+    return any(
+        name == run or name.startswith(f"{run}/") or run.startswith(f"{name}/") for run in runs
     )
+
+
+def _own(record: EffectRecord) -> str:
+    return f"{record.kind} on {', '.join(record.joints)}"
+
+
+SECTIONS: list[Callable[[Diagnosis, Detail], Section]] = [
+    found_section,
+    errors_section,
+    _time_section,
+    evidence_section,
+    _unexplained_section,
+    _next_section,
+    _candidates_section,
+    _data_section,
+]
 
 
 def _next(found: Diagnosis, experiment: dict[str, Any], config: str, file: str | None) -> Parts:
@@ -165,10 +338,7 @@ def _next(found: Diagnosis, experiment: dict[str, Any], config: str, file: str |
         return ["Next: repeat with -o DIAGNOSIS.h5, for a report and for the next motion."]
     if found.complete:
         return ["Next, with other data:", Command(("excite", "score", as_word(file), "DATA.h5"))]
-    purpose = "excite the model with what was found"
-    if experiment["purpose"] == "separate":
-        purpose = f"distinguish {counted(len(experiment['pairs']), 'pair')} of effects"
-    return [f"Next: plan a motion, to {purpose}:", next_command(config, file)]
+    return [f"Next: plan a motion, to {_purpose(experiment)}:", next_command(config, file)]
 
 
 def _in_words(found: Diagnosis) -> str:
@@ -176,8 +346,7 @@ def _in_words(found: Diagnosis) -> str:
     everything = len(found.joint_names)
     effects = ", ".join(what_and_where(each.effect, everything) for each in found.named)
     before, after = found.before.mean_relative_moving, found.after.mean_relative_moving
-    none = "nothing is missing" if found.complete else "unexplained residual"
-    return f"{effects or none}; mean error {before:.2%} → {after:.2%}"
+    return f"{effects or _none(found)}; mean error {before:.2%} → {after:.2%}"
 
 
 def _named_in_words(named: NamedEffect) -> str:
@@ -190,5 +359,5 @@ show(Diagnosis, _in_words, diagnosis_parts)
 show(
     NamedEffect,
     _named_in_words,
-    lambda named: [effect_table([named], 0, verbose=True), *other_names(named, 0)],
+    lambda named: [effect_table([named], 0, Detail.VERBOSE), *other_names(named, 0)],
 )

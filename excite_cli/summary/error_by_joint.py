@@ -1,12 +1,17 @@
 """Errors of every joint on held-out data: of the URDF, refitted, with effects; who took it off."""
 
 from collections.abc import Iterator
-from math import isnan
+from math import isnan, nan
 
 from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.diagnosis.words import assumption_in_words, counted, ends_in_words
 from excite_cli.identification.errors_of_torque import Errors
-from excite_cli.shown.answer import Parts, Table
-from excite_cli.summary.cells import figure, floor_cells, floor_columns, percent
+from excite_cli.identification.fit_words import above_the_floor
+from excite_cli.report.chart import Chart
+from excite_cli.report.error_chart import DECLARED_AND_FOUND, NOTHING_MOVES, error_charts
+from excite_cli.report.robot_chart import robot_chart
+from excite_cli.shown.answer import Block, Charts, Detail, Section, Table
+from excite_cli.summary.cells import figure, percent
 from excite_cli.summary.named_effects import what_and_where
 
 _OFF = "change by effect (pp)"
@@ -16,40 +21,90 @@ _SEEN = 0.005  # share of the first error below which a part is one of the other
 _LINES = ("URDF untouched", "declared model, refitted", "with effects")
 
 
-def error_tables(found: Diagnosis, verbose: bool) -> Parts:
-    """Where the joints move; with `verbose` every part, and another table over all samples."""
-    if not verbose:
+def errors_section(found: Diagnosis, detail: Detail) -> Section:
+    """Tables and what they come to; on a page also where the residual is, and both errors."""
+    blocks: list[Block] = list(_charts(found)) if detail == Detail.PAGE else []
+    blocks += error_tables(found, detail)
+    above = above_the_floor(found.after, found.noise_floor)
+    blocks += [above] if above else []
+    blocks += [ends_in_words(part) for part in found.parts]
+    blocks += [f"Assumed: {assumption_in_words(each)}" for each in found.assumed]
+    blocks.append(_verdict(found))
+    lead = f"On {found.held_out_run}, which took no part in choosing or fitting."
+    return Section("diagnosis-errors", "Error of the torque on held-out data", tuple(blocks), lead)
+
+
+def _verdict(found: Diagnosis) -> str:
+    low, high = found.after.interval
+    return (
+        f"{counted(len(found.named), 'effect')}"
+        + (f", {counted(len(found.approximations), 'surrogate term')}" * bool(found.approximations))
+        + "; mean held-out error where joints move "
+        f"{found.before.mean_relative_moving:.2%} → {found.after.mean_relative_moving:.2%}; over "
+        f"all samples {found.after.mean_relative:.2%} (its 95% interval {low:.2%} to {high:.2%}). "
+        f"{found.seconds:.1f} s."
+    )
+
+
+def _charts(found: Diagnosis) -> Iterator[Block]:
+    charts: tuple[Chart, ...] = error_charts(
+        DECLARED_AND_FOUND,
+        (found.before, found.after),
+        dict(zip(found.joint_names, found.torque_units, strict=True)),
+        found.noise_floor,
+    )
+    if found.skeleton is not None:
+        what = "Residual relative error where the joint moves, on held-out data"
+        shares = found.after.relative_moving
+        title = "Where the residual is"
+        charts = (robot_chart(title, found.skeleton, found.joint_names, shares, what), *charts)
+    yield Charts(charts)
+    if all(isnan(each) for each in found.after.relative_moving.values()):
+        yield NOTHING_MOVES
+
+
+def error_tables(found: Diagnosis, detail: Detail) -> list[Table]:
+    """Where the joints move; with more detail every part, and another table over all samples."""
+    if not detail:
         return [_moving(found)]
-    return [_moving(found), *([_parts(found)] if _has_parts(found) else []), _all_samples(found)]
+    parts = [_parts(found)] if _has_parts(found) else []
+    return [_moving(found), *parts, _all_samples(found)]
 
 
 def _moving(found: Diagnosis) -> Table:
-    errors = _errors(found)
-    rows = [
-        (
-            joint,
-            *(percent(each.relative_moving[joint]) for each in errors.values()),
-            *(figure(_rms(each)[joint]) for each in (found.before, found.after)),
-            unit,
-            *floor_cells(found.noise_floor, joint),
-            *([_taken_off(found, joint)] if _has_parts(found) else []),
-        )
-        for joint, unit in _joints(found)
-    ]
-    off = [_OFF] if _has_parts(found) else []
-    floor = floor_columns(found.noise_floor)
-    mean = ("mean", *(percent(each.mean_relative_moving) for each in errors.values()))
-    mean += ("",) * (3 + len(floor) + len(off))
-    return Table(
+    rows = []
+    for joint, unit in _joints(found):
+        row = _row(found, joint, unit, moving=True)
+        if found.noise_floor is not None:
+            row["noise floor"] = figure(found.noise_floor.get(joint, nan))
+        if _has_parts(found):
+            row[_OFF] = _taken_off(found, joint)
+        rows.append(row)
+    errors = {name: percent(each.mean_relative_moving) for name, each in _errors(found).items()}
+    title = (
         f"Error of the torque on held-out data ({found.held_out_run}), where joints move "
-        f"({_columns_in_words(found)})",
-        ("joint", *errors, "RMS declared", "RMS with effects", "unit", *floor, *off),
-        (*rows, mean),
-        left=("joint", "unit"),
-        words=tuple(off),
-        bold=(len(rows),),
-        parted=(len(rows),),
+        f"({_columns_in_words(found)})"
     )
+    return _with_mean(title, rows, errors)
+
+
+def _with_mean(
+    title: str, rows: list[dict[str, str]], means: dict[str, str], folded: bool = False
+) -> Table:
+    last, every = (len(rows),), [*rows, {"joint": "mean", **means}]
+    look = {"bold": last, "parted": last, "folded": folded}
+    return Table.of(title, every, ("joint", "unit"), words=(_OFF,), **look)
+
+
+def _row(found: Diagnosis, joint: str, unit: str, moving: bool) -> dict[str, str]:
+    errors = {
+        name: percent((each.relative_moving if moving else each.relative)[joint])
+        for name, each in _errors(found).items()
+    }
+    before, after = ((_rms(each) if moving else each.rms) for each in (found.before, found.after))
+    rms = {"RMS declared": figure(before[joint]), "RMS with effects": figure(after[joint])}
+    raw = {} if moving else {"RMS unfiltered": figure(found.after.rms_raw[joint])}
+    return {"joint": joint, **errors, **rms, **raw, "unit": unit}
 
 
 def _columns_in_words(found: Diagnosis) -> str:
@@ -72,17 +127,13 @@ def _errors(found: Diagnosis) -> dict[str, Errors]:
 
 
 def _joints(found: Diagnosis) -> Iterator[tuple[str, str]]:
-    """Those whose torque was measured, with its unit.
-
-    Files of earlier versions do not say whether joints slide.
-    """
-    units = found.traces.torque_units if found.traces else ("",) * len(found.joint_names)
-    every = zip(found.joint_names, units, strict=True)
+    """Those whose torque was measured, with its unit."""
+    every = zip(found.joint_names, found.torque_units, strict=True)
     return ((joint, unit) for joint, unit in every if not isnan(found.after.rms[joint]))
 
 
 def _rms(error: Errors) -> dict[str, float]:
-    """Where joints move; files of earlier versions know it over all samples only."""
+    """Where joints move; over all samples where that is not known."""
     return error.rms_moving or error.rms
 
 
@@ -155,22 +206,15 @@ def _parts(found: Diagnosis) -> Table:
         left=("joint", "unit"),
         words=("contribution",),
         parted=tuple(parted[1:]),
+        folded=True,
     )
 
 
 def _all_samples(found: Diagnosis) -> Table:
-    errors = _errors(found)
-    rows = [
-        (joint, *(percent(each.relative[joint]) for each in errors.values()),
-         *(figure(each.rms[joint]) for each in (found.before, found.after)), unit)
-        for joint, unit in _joints(found)
-    ]  # fmt: skip
-    mean = ("mean", *(percent(each.mean_relative) for each in errors.values()), "", "", "")
-    return Table(
-        f"Over all samples of {found.held_out_run}, including joints at rest",
-        ("joint", *errors, "RMS declared", "RMS with effects", "unit"),
-        (*rows, mean),
-        left=("joint", "unit"),
-        bold=(len(rows),),
-        parted=(len(rows),),
+    rows = [_row(found, joint, unit, moving=False) for joint, unit in _joints(found)]
+    title = (
+        f"Over all samples of {found.held_out_run}, including joints at rest (unfiltered: with "
+        "effects, the torque as recorded)"
     )
+    errors = {name: percent(each.mean_relative) for name, each in _errors(found).items()}
+    return _with_mean(title, rows, errors, folded=True)

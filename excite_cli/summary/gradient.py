@@ -6,6 +6,7 @@ from excite_cli.excitation.gradient_check import (
     PAPER_FORWARD_ERROR,
     GradientCheck,
 )
+from excite_cli.fields import data_of
 from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
 
@@ -29,15 +30,8 @@ _TIMES = {
 
 def gradient_answer(found: GradientCheck) -> Answer:
     """What `excite verify-gradient` answers."""
-    data = {
-        "variables": found.variables,
-        "samples": found.samples,
-        "base_parameters": found.base_parameters,
-        "condition_number": found.condition_number,
-        "relative_error": found.relative_error,
-        "seconds": found.seconds,
-        "passed": found.passed,
-    }
+    data = data_of(found, "variables", "samples", "base_parameters", "condition_number",
+                   "relative_error", "seconds", "passed")  # fmt: skip
     return Answer(tuple(gradient_parts(found)), data, good=found.passed)
 
 
@@ -53,22 +47,24 @@ def gradient_parts(found: GradientCheck) -> Parts:
 
 
 def _errors(found: GradientCheck) -> Table:
-    rows = tuple(
-        (words, f"{found.relative_error[key]:.1e}", allowed)
+    rows = (
+        {"pair": words, "error": f"{found.relative_error[key]:.1e}", "allowed": allowed}
         for key, (words, allowed) in _PAIRS.items()
     )
-    return Table("Relative error of the gradient", ("pair", "error", "allowed"), rows, ("pair",))
+    return Table.of("Relative error of the gradient", rows, left=("pair",))
 
 
 def _times(found: GradientCheck) -> Table:
     forward = found.seconds["forward"]
-    rows = tuple(
-        (words, f"{1e3 * found.seconds[key]:.2f}", f"{forward / found.seconds[key]:.3g} ×")
+    rows = (
+        {
+            "computation": words,
+            "ms": f"{1e3 * found.seconds[key]:.2f}",
+            "faster than forward differences": f"{forward / found.seconds[key]:.3g} ×",
+        }
         for key, words in _TIMES.items()
     )
-    return Table(
-        "Time", ("computation", "ms", "faster than forward differences"), rows, ("computation",)
-    )
+    return Table.of("Time", rows, left=("computation",))
 
 
 def _verdict(found: GradientCheck) -> str:

@@ -1,10 +1,13 @@
 """What `excite identify` found, as tables and as data."""
 
 from collections.abc import Mapping, Sequence
-from math import isnan
+from math import isnan, nan
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from excite_cli.fields import data_of
 from excite_cli.identification.fit import Fit
 from excite_cli.identification.fit_words import (
     above_the_floor,
@@ -15,25 +18,38 @@ from excite_cli.identification.fit_words import (
     with_deviation,
 )
 from excite_cli.identification.identify import Identification
-from excite_cli.identification.link_changes import LinkChange, LinkParameterChange
+from excite_cli.identification.link_changes import LinkChange
 from excite_cli.identification.stored_model import StoredFit
-from excite_cli.shown.answer import Answer, Command, Parts, Table, as_word
+from excite_cli.report.error_chart import NOTHING_MOVES, error_charts
+from excite_cli.report.parameter_chart import parameter_charts
+from excite_cli.report.residual_chart import residuals_in_time
+from excite_cli.shown.answer import (
+    Answer,
+    Block,
+    Charts,
+    Command,
+    KeyFigure,
+    Parts,
+    Section,
+    Table,
+    Text,
+    as_word,
+)
 from excite_cli.shown.record import show
-from excite_cli.summary.cells import figure, files_in_words, floor_cells, floor_columns, percent
+from excite_cli.summary.cells import (
+    figure,
+    files_in_words,
+    findings_data,
+    percent,
+)
+from excite_cli.summary.findings import data_blocks
+
+_CORRELATED, _MOST_PAIRS = 0.95, 15
 
 # What a fit changed of the links, as a table, a line on the others, and as data.
 
 _TITLE = (
     "Links deviating from the URDF (± one standard deviation; centre of mass in the link's frame)"
-)
-_COLUMNS = (
-    "link",
-    "mass [kg]",
-    "URDF mass [kg]",
-    "centre x, y, z [mm]",
-    "URDF centre [mm]",
-    "determined by data",
-    "physically infeasible",
 )
 
 
@@ -47,61 +63,40 @@ def link_parts(links: Sequence[LinkChange]) -> Parts:
         f"{others} {'other ' if shown else ''}link{'s' * (others != 1)} of {len(links)}: mass and "
         "centre within two standard deviations of the URDF's."
     )
-    rows = tuple(_row(link) for link in shown)
-    left = ("link", "determined by data", "physically infeasible")
-    return [
-        *(
-            [Table(_TITLE, _COLUMNS, rows, left=left, words=("physically infeasible",))]
-            if rows
-            else []
-        ),
-        *([counted] if others else []),
-    ]
+    left = ("link", "determined by data")
+    table = Table.of(_TITLE, map(_row, shown), left, words=("physically infeasible",))
+    return [*([table] if shown else []), *([counted] if others else [])]
 
 
 def link_data(links: Sequence[LinkChange]) -> list[dict[str, Any]]:
     """All links for `--json`: masses [kg], centres [m] in the link's frame."""
+    changed = ("before", "after", "std", "left", "determined")
     return [
         {
-            "link": link.link,
-            "joint": link.joint,
-            "mass": _link_changes_data(link.mass),
+            **data_of(link, "link", "joint", "significant", "marks"),
+            "mass": data_of(link.mass, *changed),
             "center": {
-                axis: _link_changes_data(c) for axis, c in zip("xyz", link.center, strict=True)
+                axis: data_of(each, *changed) for axis, each in zip("xyz", link.center, strict=True)
             },
-            "significant": link.significant,
-            "marks": list(link.marks),
         }
         for link in links
     ]
 
 
-def _link_changes_data(change: LinkParameterChange) -> dict[str, Any]:
-    return {
-        "before": change.before,
-        "after": change.after,
-        "std": change.std,
-        "left": change.left,
-        "determined": change.determined,
-    }
-
-
-def _row(link: LinkChange) -> tuple[str, ...]:
+def _row(link: LinkChange) -> dict[str, str]:
     """A line per axis in the cells of the centre."""
-    known = [
-        name
-        for name, change in zip(("mass", "x", "y", "z"), (link.mass, *link.center), strict=True)
-        if change.determined
-    ]
-    return (
-        link.link,
-        with_deviation(link.mass.after, link.mass.std),
-        f"{link.mass.before:.4g}",
-        "\n".join(with_deviation(1e3 * c.after, 1e3 * c.std) for c in link.center),
-        "\n".join(f"{1e3 * c.before:.4g}" for c in link.center),
-        ", ".join(known) or "nothing",
-        "; ".join(link.marks),
-    )
+    changes = zip(("mass", "x", "y", "z"), (link.mass, *link.center), strict=True)
+    known = [name for name, change in changes if change.determined]
+    center = (with_deviation(1e3 * each.after, 1e3 * each.std) for each in link.center)
+    return {
+        "link": link.link,
+        "mass [kg]": with_deviation(link.mass.after, link.mass.std),
+        "URDF mass [kg]": f"{link.mass.before:.4g}",
+        "centre x, y, z [mm]": "\n".join(center),
+        "URDF centre [mm]": "\n".join(f"{1e3 * each.before:.4g}" for each in link.center),
+        "determined by data": ", ".join(known) or "nothing",
+        "physically infeasible": "; ".join(link.marks),
+    }
 
 
 def identification_answer(
@@ -122,129 +117,108 @@ def _next(found: Identification, file: str | None) -> Parts:
 
 def identification_parts(found: Identification) -> Parts:
     """Parameters, errors per joint, and sentences."""
-    low, high = found.error.interval
     fit = found.fit
-    sentences = [
-        f"Mean relative error on {found.held_out_run}: {found.error.mean_relative:.2%} "
-        f"(95% interval {low:.2%} to {high:.2%}); where joints move "
-        f"{found.error.mean_relative_moving:.2%}.",
-        f"Effective sample size: {fit.samples:.0f} of {fit.count} filtered torque samples of all "
-        "joints (their noise is correlated).",
-        f"{found.hausman.sentence()[0].upper()}{found.hausman.sentence()[1:]}.",
-    ]
-    if fit.consistent is not None:
-        sentences.append(consistency_in_words(fit))
+    consistent = consistency_in_words(fit)
     above = above_the_floor(found.error, found.noise_floor)
     return [
         _parameter_table(fit),
         _error_table(found),
         *link_parts(fit.links),
         *([above] if above else []),
-        *sentences,
+        _mean_error(found),
+        _effective_size(fit),
+        f"{found.hausman.sentence()[0].upper()}{found.hausman.sentence()[1:]}.",
+        *([consistent] if consistent else []),
     ]
 
 
-def _parameter_table(fit: Fit) -> Table:
-    rows = tuple(
-        (
-            name,
-            short_number(fit.values[i], 5),
-            short_number(fit.std[i], 3),
-            relative_in_words(fit.relative_std[i]),
-            fit.units[i],
-            fixed_by_data(fit, i),
-        )
+def _mean_error(found: Identification | StoredFit) -> str:
+    low, high = found.error.interval
+    return (
+        f"Mean relative error on {found.held_out_run}: {found.error.mean_relative:.2%} "
+        f"(95% interval {low:.2%} to {high:.2%}); where joints move "
+        f"{found.error.mean_relative_moving:.2%}."
+    )
+
+
+def _effective_size(fit: Fit) -> str:
+    return (
+        f"Effective sample size: {fit.samples:.0f} of {fit.count} filtered torque samples of all "
+        "joints (their noise is correlated)."
+    )
+
+
+def _parameter_table(fit: Fit, grouped: bool = False) -> Table:
+    """With `grouped` also what each base parameter groups."""
+    rows = (
+        {
+            "parameter": name,
+            "value": short_number(fit.values[i], 5),
+            "std": short_number(fit.std[i], 3),
+            "relative std": relative_in_words(fit.relative_std[i]),
+            "unit": fit.units[i],
+            "identifiable": fixed_by_data(fit, i),
+            **({"what it groups": fit.words[i] or "–"} if grouped else {}),
+        }
         for i, name in enumerate(fit.names)
     )
-    names = ("parameter", "value", "std", "relative std", "unit", "identifiable")
     title = "Parameters (base parameters stand for sums of inertial ones, and may be negative)"
-    return Table(title, names, rows, left=("parameter", "unit", "identifiable"))
+    left = ("parameter", "unit", "identifiable")
+    return Table.of(title, rows, left, words=("what it groups",), folded=grouped)
 
 
 def _error_table(found: Identification | StoredFit) -> Table:
     """Errors per joint on the held-out part, and the training part's and the noise floor beside."""
-    error, floor, joints = found.error, found.noise_floor, found.fit.joint_names
-    units = found.torque_units or ("",) * len(joints)
-    rows = tuple(
-        (
-            joint,
-            percent(error.relative_moving[joint]),
-            percent(error.relative[joint]),
-            figure(error.rms[joint]),
-            *floor_cells(floor, joint),
-            figure(error.rms_raw[joint]),
-            unit,
-            percent(found.training_error.relative[joint]),
-        )
-        for joint, unit in zip(joints, units, strict=True)
+    error, floor = found.error, found.noise_floor
+    rows = (
+        {
+            "joint": joint,
+            "error, moving": percent(error.relative_moving[joint]),
+            "error, all": percent(error.relative[joint]),
+            "RMS": figure(error.rms[joint]),
+            **({} if floor is None else {"noise floor": figure(floor.get(joint, nan))}),
+            "RMS unfiltered": figure(error.rms_raw[joint]),
+            "unit": unit,
+            "training error": percent(found.training_error.relative[joint]),
+        }
+        for joint, unit in zip(found.fit.joint_names, found.torque_units, strict=True)
         if not isnan(error.rms[joint])  # its torque was not measured
     )
     title = "Error of the torque on held-out data (RMS: of all samples, filtered, and as recorded)"
-    names = (
-        "joint", "error, moving", "error, all", "RMS", *floor_columns(floor), "RMS unfiltered",
-        "unit", "training error",
-    )  # fmt: skip
-    return Table(title, names, rows, left=("joint", "unit"))
+    return Table.of(title, rows, left=("joint", "unit"))
 
 
 def _data(found: Identification) -> dict[str, Any]:
     """The answer for `--json`."""
-    fit = found.fit
+    fit, bias = found.fit, found.hausman
+    columns = ("values", "std", "relative_std", "identifiable", "essential", "units")
+    keys = ("name", "value", *columns[1:-1], "unit")
+    table = zip(fit.names, *(data_of(getattr(fit, name)) for name in columns), strict=True)
+    consistent = fit.consistent
     return {
-        "parameters": [
-            {
-                "name": name,
-                "value": float(fit.values[i]),
-                "std": float(fit.std[i]),
-                "relative_std": float(fit.relative_std[i]),
-                "identifiable": bool(fit.identifiable[i]),
-                "essential": bool(fit.essential[i]),
-                "unit": fit.units[i],
-            }
-            for i, name in enumerate(fit.names)
-        ],
+        **data_of(found, "held_out_run", "error", "training_error", "noise_floor"),
+        "parameters": [dict(zip(keys, row, strict=True)) for row in table],
         "effects": [
             {
                 "kind": effect.kind,
                 "joints": [fit.joint_names[j] for j in effect.joints],
-                "parameters": {
-                    name: {"value": value.value, "std": value.std, "unit": value.unit}
-                    for name, value in fit.effect_report(i).items()
-                },
+                "parameters": data_of(fit.effect_report(i)),
             }
             for i, effect in enumerate(fit.effects)
         ],
-        "held_out_run": found.held_out_run,
-        "error": found.error.as_data(),
-        "training_error": found.training_error.as_data(),
-        "noise_floor": found.noise_floor,
         "samples": {"count": fit.count, "independent": fit.samples},
         "noise": dict(zip(fit.joint_names, map(float, fit.noise), strict=True)),
-        "consistent": None
-        if fit.consistent is None
-        else {
-            "solved": fit.consistent.solved,
-            "status": fit.consistent.status,
-            "cost": fit.consistent.cost,
-            "spread": fit.consistent.spread,
-            "smallest_eigenvalue": float(fit.consistent.eigenvalues.min()),
+        "consistent": consistent
+        and {
+            **data_of(consistent, "solved", "status", "cost", "spread"),
+            "smallest_eigenvalue": float(consistent.eigenvalues.min()),
         },
         "links": link_data(fit.links),
         "closed_loop_bias": {
-            "testable": found.hausman.testable,
-            "p_value": found.hausman.p_value,
-            "source": found.hausman.source,
-            "text": found.hausman.sentence(),
+            **data_of(bias, "testable", "p_value", "source"),
+            "text": bias.sentence(),
         },
-        "findings": [
-            {
-                "kind": finding.kind,
-                "severity": finding.severity,
-                "run": finding.run,
-                "text": finding.text,
-            }
-            for finding in found.findings
-        ],
+        "findings": findings_data(found.findings),
         "processing": found.processing.as_data(),
     }
 
@@ -268,6 +242,129 @@ def _in_words(found: Identification | StoredFit) -> str:
 
 def _stored_parts(found: StoredFit) -> Parts:
     return [_parameter_table(found.fit), _error_table(found), *link_parts(found.fit.links)]
+
+
+# The page of a fit.
+
+
+def fit_figures(stored: StoredFit) -> tuple[KeyFigure, ...]:
+    """What sums a fit up."""
+    fit, error = stored.fit, stored.error
+    low, high = error.interval
+    fixed = int(np.sum(fit.identifiable))
+    return (
+        KeyFigure(
+            "error on held-out data, moving",
+            f"{error.mean_relative_moving:.2%}",
+            f"all samples {error.mean_relative:.2%}, 95% interval {low:.2%} to {high:.2%}",
+        ),
+        KeyFigure(
+            "identifiable parameters",
+            f"{fixed} of {len(fit.names)}",
+            f"{fit.rank} base parameters, {len(fit.names) - fit.rank} of effects",
+        ),
+        KeyFigure(
+            "effective sample size",
+            f"{fit.samples:.0f}",
+            f"of {fit.count} samples, which are correlated in time",
+        ),
+    )
+
+
+def fit_sections(stored: StoredFit) -> list[Section]:
+    """Errors, parameters, residual in time, data and choices."""
+    fit, units = stored.fit, stored.torque_units
+    # What took no part comes first: it is the judge.
+    traces = sorted(stored.traces, key=lambda trace: not trace.held_out)
+    return [
+        Section(
+            "fit-errors",
+            "Error of the fit",
+            tuple(_error_blocks(stored)),
+            f"{stored.held_out_run} took no part in the fit. {_mean_error(stored)}",
+        ),
+        parameter_section(fit),
+        Section(
+            "fit-time",
+            "Fit in time",
+            residuals_in_time(traces, fit.joint_names, units),
+            "Filtered torque, as used in the fit. Above: measured torque and prediction of the "
+            "model; below: residual. Shaded: held out from the fit.",
+        ),
+        Section(
+            "fit-data",
+            "Data and choices",
+            (
+                f"{stored.closed_loop_bias[:1].upper()}{stored.closed_loop_bias[1:]}.",
+                *data_blocks(stored, fit.joint_names),
+            ),
+            f"From {', '.join(stored.sources)}.",
+        ),
+    ]
+
+
+def _error_blocks(stored: StoredFit) -> list[Block]:
+    units = dict(zip(stored.fit.joint_names, stored.torque_units, strict=True))
+    errors, floor = (stored.training_error, stored.error), stored.noise_floor
+    above = above_the_floor(stored.error, floor)
+    moves = not all(isnan(each) for each in stored.error.relative_moving.values())
+    return [
+        Charts(error_charts(("training", "held-out"), errors, units, floor)),
+        *([] if moves else [NOTHING_MOVES]),
+        *([above] if above else []),
+        _error_table(stored),
+    ]
+
+
+def parameter_section(fit: Fit) -> Section:
+    """Values with intervals, and how well the data fix each."""
+    blocks: list[Block] = [
+        Charts(parameter_charts(fit)),
+        _parameter_table(fit, grouped=True),
+        *correlated_parameters(fit),
+        *link_parts(fit.links),
+    ]
+    if fit.consistent is not None:
+        blocks.append(Text(consistency_in_words(fit), "plain" if fit.consistent.solved else "bad"))
+    fixed = int(np.sum(fit.identifiable))
+    kept = " The URDF's inertias are kept as a prior." if fit.inertias == "cad" else ""
+    lead = (
+        f"{fixed} of {len(fit.names)} parameters are identifiable. A full dot: identifiable; a "
+        "hollow dot: identifiable, zero within error; a cross with a dashed interval: not "
+        "identifiable. Standard deviations respect serial correlation. "
+        f"{_effective_size(fit)}{kept}"
+    )
+    return Section("fit-parameters", "Parameters", tuple(blocks), lead)
+
+
+def correlated_parameters(fit: Fit) -> tuple[Block, ...]:
+    """Pairs of which only a sum or a difference is known well."""
+    std = np.where(np.isfinite(fit.std) & (fit.std > 0), fit.std, np.nan)
+    with np.errstate(invalid="ignore"):
+        correlation = np.nan_to_num(fit.covariance / np.outer(std, std), posinf=0.0, neginf=0.0)
+    i, j = np.triu_indices(len(std), 1)
+    strong = np.abs(correlation[i, j])
+    order = np.argsort(-strong, kind="stable")
+    pairs = [k for k in order if strong[k] > _CORRELATED]
+    if not pairs:
+        worst = f"{strong[order[0]]:.2f}" if len(order) else "0"
+        text = f"No two parameters are correlated by more than {_CORRELATED} (at most {worst})."
+        return (Text(text),)
+    rows = tuple(
+        (fit.names[i[k]], fit.names[j[k]], f"{correlation[i[k], j[k]]:+.3f}")
+        for k in pairs[:_MOST_PAIRS]
+    )
+    more = f"; the {_MOST_PAIRS} strongest are shown" if len(pairs) > _MOST_PAIRS else ""
+    return (
+        Table(
+            f"{len(pairs)} pairs correlated by more than {_CORRELATED}{more}",
+            ("parameter", "and", "correlation"),
+            rows,
+            left=("parameter", "and"),
+            note="Of such a pair the data know a sum or a difference far better than either.",
+            folded=True,
+        ),
+    )
 
 
 show(Fit, _fit_in_words, lambda fit: [_parameter_table(fit)])

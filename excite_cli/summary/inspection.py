@@ -5,8 +5,20 @@ from typing import Any, Protocol
 
 from excite_cli.checks.check_result import CheckResult
 from excite_cli.checks.sentences import written
+from excite_cli.fields import data_of
 from excite_cli.measurement.dataset import Dataset, Run
-from excite_cli.shown.answer import Answer, Command, Part, Parts, Table, as_word
+from excite_cli.shown.answer import (
+    Answer,
+    Command,
+    KeyFigure,
+    Page,
+    Part,
+    Parts,
+    Section,
+    Table,
+    Text,
+    as_word,
+)
 from excite_cli.shown.record import show
 
 # Measured data in words, and their runs as a table.
@@ -27,19 +39,18 @@ def dataset_parts(data: Dataset) -> Parts:
 def _run_table(title: str, runs: Sequence[Run]) -> Table:
     """Also where each came from, if they were read from files."""
     read = any(run.origin.file for run in runs)
-    rows = tuple(
-        (
-            run.label,
-            str(len(run.t)),
-            f"{run.duration:.2f}",
-            f"{1.0 / run.step:.4g}",
-            f"{run.usable().mean():.1%}",
-            *([f"{run.origin.file} {run.origin.place}".strip()] if read else []),
-        )
+    rows = (
+        {
+            "run": run.label,
+            "samples": str(len(run.t)),
+            "seconds": f"{run.duration:.2f}",
+            "rate [Hz]": f"{1.0 / run.step:.4g}",
+            "usable": f"{run.usable().mean():.1%}",
+            **({"from": f"{run.origin.file} {run.origin.place}".strip()} if read else {}),
+        }
         for run in runs
     )
-    names = ("run", "samples", "seconds", "rate [Hz]", "usable", *(["from"] if read else []))
-    return Table(title, names, rows, left=("run",), words=("from",) if read else ())
+    return Table.of(title, rows, left=("run",), words=("from",))
 
 
 def _run_in_words(run: Run) -> str:
@@ -86,14 +97,18 @@ def inspection_parts(found: AnyInspection) -> list[Part]:
 
 def checks_table(found: AnyInspection) -> Table:
     """A row for every check: its status, its joints, and what settles it."""
-    rows = tuple(
-        (each.name, each.status, ", ".join(each.joints), written(each.settings))
+    rows = (
+        {
+            "check": each.name,
+            "status": each.status,
+            "joints": ", ".join(each.joints),
+            "key that resolves it": written(each.settings),
+        }
         for each in found.results
     )
     bold = tuple(k for k, each in enumerate(found.results) if each.status != "ok")
-    columns = ("check", "status", "joints", "key that resolves it")
     words = ("joints", "key that resolves it")
-    return Table("Set-up checks", columns, rows, columns, words, bold)
+    return Table.of("Set-up checks", rows, left=("check", "status"), words=words, bold=bold)
 
 
 def remarks(found: AnyInspection) -> list[str]:
@@ -157,20 +172,32 @@ def counted(found: AnyInspection) -> tuple[int, int, int]:
 
 def _data(found: AnyInspection, applied: str | None) -> dict[str, Any]:
     """The answer for `--json`."""
+    own = ("name", "status", "joints", "runs", "evidence", "settings")
     return {
         "good": found.good,
-        "checks": [
-            {
-                "name": each.name,
-                "status": each.status,
-                "joints": list(each.joints),
-                "runs": each.runs,
-                "evidence": each.evidence,
-                "key": written(each.settings),
-                "settings": dict(each.settings),
-            }
-            for each in found.results
-        ],
         "settings": dict(found.settings),
         "output": applied,
+        "checks": [
+            {**data_of(each, *own), "key": written(each.settings)} for each in found.results
+        ],
     }
+
+
+def inspection_page(found: AnyInspection, title: str) -> Page:
+    """The table of all checks, the evidence of what is not fine, and what would be set."""
+    faults, doubts, _ = counted(found)
+    rows = tuple((key, written({key: value})) for key, value in found.settings.items())
+    columns = ("key", "line that inspect --apply writes")
+    cures = Table("", columns, rows, left=columns[:1], words=columns[1:])
+    sections = (
+        Section("checks", "Checks", (checks_table(found),)),
+        Section("evidence", "Evidence", tuple(remarks(found))),
+        Section("settings", "What would change in the config", (cures,) if rows else ()),
+    )
+    return Page(
+        title,
+        "Log and model: set-up checks",
+        (KeyFigure("faults", str(faults)), KeyFigure("doubts", str(doubts))),
+        tuple(section for section in sections if section.blocks),
+        (Text(headline(found), "good" if found.good else "bad"),),
+    )

@@ -5,6 +5,7 @@ from typing import Any
 from excite_cli.excitation.inspection import Inspection, Inspections
 from excite_cli.excitation.not_modelled import not_modelled
 from excite_cli.excitation.problem import Problem
+from excite_cli.fields import data_of
 from excite_cli.geometry.reasons import standing_in_words
 from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
@@ -43,13 +44,19 @@ def inspections_parts(found: Inspections) -> Parts:
 
 
 def _table(title: str, inspection: Inspection) -> Table:
-    rows = []
-    for key, (state, _) in inspection.states.items():
-        worst = inspection.margins[key]
-        figures = (f"{worst.margin:.5f}", worst.unit, worst.label, f"{worst.time:.4f}")
-        rows.append((key, *figures, "BROKEN" if state == "broken" else state))
-    names = ("constraint", "margin", "unit", "where", "time [s]", "verdict")
-    return Table(title, names, tuple(rows), ("constraint", "unit", "verdict"), ("where",))
+    rows = (
+        {
+            "constraint": key,
+            "margin": f"{worst.margin:.5f}",
+            "unit": worst.unit,
+            "where": worst.label,
+            "time [s]": f"{worst.time:.4f}",
+            "verdict": "BROKEN" if state == "broken" else state,
+        }
+        for key, (state, _) in inspection.states.items()
+        for worst in [inspection.margins[key]]
+    )
+    return Table.of(title, rows, left=("constraint", "unit", "verdict"), words=("where",))
 
 
 def _alarms(name: str, inspection: Inspection) -> list[str]:
@@ -108,7 +115,7 @@ def _notes(found: Inspections, name: str) -> list[str]:
 
 def _data(found: Inspections, index: int, name: str) -> dict[str, Any]:
     inspection, off = found[name], found.difference(name)
-    margins = inspection.margins
+    margins, second = inspection.margins, ("instants", "of", "difference", "unit", "time", "agrees")
     data: dict[str, Any] = {
         "index": index,
         "name": name,
@@ -120,37 +127,26 @@ def _data(found: Inspections, index: int, name: str) -> dict[str, Any]:
             key: {"state": state, "reason": reason}
             for key, (state, reason) in inspection.states.items()
         },
-        "samples_differ": {"share": off.share, "time": off.time},
+        "samples_differ": data_of(off, "share", "time"),
         "doubt": found.doubt(name) or None,
-    }
-    data["second_path"] = {
-        each.name: {
-            "instants": each.instants,
-            "of": each.of,
-            "difference": each.difference,
-            "unit": each.unit,
-            "where": each.label,
-            "time": each.time,
-            "agrees": each.agrees,
-        }
-        for each in inspection.second
+        "second_path": {
+            each.name: {**data_of(each, *second), "where": each.label} for each in inspection.second
+        },
     }
     if inspection.meshes is not None:
         gaps, times = inspection.meshes.gaps, inspection.meshes.times
         data["meshes"] = {
-            "pairs": gaps.pairs,
-            "beyond": gaps.beyond,
+            **data_of(gaps, "pairs", "beyond"),
+            "always_in_contact": [list(pair) for pair in gaps.always],
             "near": [
                 {
+                    **data_of(gap, "distance", "touching"),
                     "links": [gap.first, gap.second],
-                    "distance": gap.distance,
                     "time": float(times[gap.index]),
-                    "touching": gap.touching,
                     "not_judged": standing_in_words(gap.standing),
                 }
                 for gap in gaps.near
             ],
-            "always_in_contact": [list(pair) for pair in gaps.always],
         }
     return data
 

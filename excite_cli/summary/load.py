@@ -2,11 +2,12 @@
 
 from typing import Any
 
+from excite_cli.fields import data_of
 from excite_cli.identification.carried_load import LoadIdentification
 from excite_cli.identification.fit_words import with_deviation
 from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
-from excite_cli.summary.cells import percent
+from excite_cli.summary.cells import findings_data, percent
 
 
 def load_answer(found: LoadIdentification) -> Answer:
@@ -16,31 +17,30 @@ def load_answer(found: LoadIdentification) -> Answer:
 
 def load_parts(found: LoadIdentification) -> Parts:
     """A sentence, the ten parameters, and errors per joint."""
-    rows = tuple(
-        (name, with_deviation(scale * each.value, scale * each.std), unit)
+    rows = (
+        {
+            "parameter": name,
+            "value": with_deviation(scale * each.value, scale * each.std),
+            "unit": unit,
+        }
         for name, each in found.parameters.items()
         for scale, unit in [(1e3, "mm") if each.unit == "m" else (1.0, each.unit)]
     )
     title = (
         f"Load on {found.link}, in its frame (± one standard deviation; inertia about the centre)"
     )
-    errors = tuple(
-        (
-            joint,
-            percent(found.without.relative_moving[joint]),
-            percent(found.with_load.relative_moving[joint]),
-        )
-        for joint in found.with_load.relative_moving
+    errors = (
+        {
+            "joint": joint,
+            "fit without the load": percent(found.without.relative_moving[joint]),
+            "with it": percent(error),
+        }
+        for joint, error in found.with_load.relative_moving.items()
     )
     return [
         _in_words(found),
-        Table(title, ("parameter", "value", "unit"), rows, left=("parameter", "unit")),
-        Table(
-            "Torque error on these data, where the joint moves",
-            ("joint", "fit without the load", "with it"),
-            errors,
-            left=("joint",),
-        ),
+        Table.of(title, rows, left=("parameter", "unit")),
+        Table.of("Torque error on these data, where the joint moves", errors, left=("joint",)),
     ]
 
 
@@ -65,24 +65,9 @@ def _data(found: LoadIdentification) -> dict[str, Any]:
     """The answer for `--json`."""
     return {
         "good": found.possible,
-        "link": found.link,
-        "joint": found.joint,
-        "parameters": {
-            name: {"value": each.value, "std": each.std, "unit": each.unit}
-            for name, each in found.parameters.items()
-        },
-        "values": [float(x) for x in found.values],
-        "covariance": [[float(x) for x in row] for row in found.covariance],
-        "error": {
-            "without": found.without.as_data(),
-            "with_load": found.with_load.as_data(),
-            "of_the_fit": found.fit_error,
-        },
-        "seconds": found.seconds,
-        "findings": [
-            {"kind": f.kind, "severity": f.severity, "run": f.run, "text": f.text}
-            for f in found.findings
-        ],
+        **data_of(found, "link", "joint", "parameters", "values", "covariance", "seconds"),
+        "error": {**data_of(found, "without", "with_load"), "of_the_fit": found.fit_error},
+        "findings": findings_data(found.findings),
     }
 
 

@@ -1,6 +1,7 @@
 """Planned motions: condition numbers beside each other, worst margins, what comes after them."""
 
 from collections.abc import Mapping, Sequence
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,8 @@ from excite_cli.excitation.progress import Status
 from excite_cli.excitation.random_baseline import RandomMotion
 from excite_cli.excitation.random_comparison import Comparison
 from excite_cli.excitation.result import Result
-from excite_cli.shown.answer import Answer, Parts, Table
+from excite_cli.fields import data_of
+from excite_cli.shown.answer import Answer, Detail, Parts, Table
 from excite_cli.shown.record import show
 from excite_cli.summary.expectation import expectation_parts, power_data
 from excite_cli.summary.pairs import (
@@ -59,7 +61,8 @@ def plan_answer(
     if model.spec.criterion.of == "robot" and result.motions:
         judged = efficiency or (until is not None and until.efficiency is not None)
         found = invariants(model, result.stack, design_for(model) if judged else None)
-        data.update(invariants_data(found))
+        data |= data_of(found, "torque_deviation", "efficiency")
+        data["efficiency_slack"] = found.slack  # the efficiency is at most too high by exp(slack)
         if found.efficiency is not None:
             parts.insert(-1, invariants_in_words(found))
         expected = expectation(model, result, power)
@@ -129,34 +132,24 @@ def invariants_in_words(found: Invariants) -> str:
     )
 
 
-def invariants_data(found: Invariants) -> dict[str, Any]:
-    """The same for `--json`; `efficiency` is at most too high by the factor exp(slack)."""
-    return {
-        "torque_deviation": found.torque_deviation,
-        "efficiency": found.efficiency,
-        "efficiency_slack": found.slack,
-    }
-
-
-_FINE = "stacked, finely sampled"
+_NUMBERS = ("index", "condition_number", "stacked_condition_number")
 
 
 def motion_table(motions: Sequence[Motion]) -> Table:
     """Condition numbers of each motion and of the stack (the paper's Table I), status, effort."""
-    rows = tuple(
-        (
-            str(motion.index),
-            f"{motion.condition_number:.2f}",
-            f"{motion.stacked_condition_number:.2f}",
-            _dense(motion),
-            motion.status if motion.improved else f"{motion.status}; no improvement",
-            str(motion.iterations),
-            f"{motion.seconds:.1f}",
-        )
+    rows = (
+        {
+            "motion": str(motion.index),
+            "own": f"{motion.condition_number:.2f}",
+            "stacked": f"{motion.stacked_condition_number:.2f}",
+            "stacked, finely sampled": _dense(motion),
+            "status": motion.status + "; no improvement" * (not motion.improved),
+            "iterations": str(motion.iterations),
+            "planning [s]": f"{motion.seconds:.1f}",
+        }
         for motion in motions
     )
-    names = ("motion", "own", "stacked", _FINE, "status", "iterations", "planning [s]")
-    return Table("Condition numbers", names, rows, left=("status",))
+    return Table.of("Condition numbers", rows, left=("status",))
 
 
 def _dense(motion: Motion) -> str:
@@ -164,31 +157,49 @@ def _dense(motion: Motion) -> str:
     return "–" if dense is None else f"{dense:.2f}"
 
 
-def margin_table(motions: Sequence[Motion]) -> Table:
-    """The worst margin of every constraint over all motions, at controller rate."""
+def margin_table(motions: Sequence[Motion], detail: Detail = Detail.BRIEF) -> Table:
+    """The worst margin of every constraint over all motions, at controller rate.
+
+    On a page also as a share of the size of what is bounded, and whether it is proved.
+    """
     rows = []
-    for name in motions[0].margins:
-        motion = min(motions, key=lambda m: m.margins[name].margin)
+    for name in dict.fromkeys(name for motion in motions for name in motion.margins):
+        held = [motion for motion in motions if name in motion.margins]
+        motion = min(held, key=lambda each: each.margins[name].margin)
         worst = motion.margins[name]
-        figures = (f"{worst.margin:.4f}", worst.unit, worst.label, str(motion.index))
-        rows.append((name, *figures, f"{worst.time:.3f}"))
-    names = ("constraint", "margin", "unit", "where", "motion", "time [s]")
-    left, words = ("constraint", "unit"), ("where",)
-    return Table("Worst margins, sampled at 1 kHz", names, tuple(rows), left, words)
+        states = [each.certified[name] for each in held if name in each.certified]
+        state = "–" if not states else "proved" if all(states) else "sampled"
+        row = {
+            "constraint": name,
+            "margin": f"{worst.margin:.4f}",
+            "unit": worst.unit,
+            "where": worst.label,
+            "motion": str(motion.index),
+            "time [s]": f"{worst.time:.3f}",
+        }
+        if detail:
+            row["share of its size"] = f"{100 * worst.share:.2g} %"
+            row["verdict"] = "BROKEN" if worst.violations else state
+        rows.append(row)
+    left = ("constraint", "unit", "verdict")
+    return Table.of("Worst margins, sampled at 1 kHz", rows, left, words=("where",))
 
 
 def outlook_table(outlook: dict[str, Any]) -> Table:
     """What the motions are expected to tell apart."""
     least = outlook["distinguished_from"]
     title = f"Kullback-Leibler divergence of effects [nats]; from {least:g} on, distinguished"
-    names = ("effect", "or", "measured data", "with this motion", "motions needed")
-    rows = []
-    for pair in outlook["pairs"]:
-        needed = pair["motions_needed"]
-        figures = (f"{pair['kl_so_far']:.2g}", f"{pair['expected_kl']:.3g}")
-        count = "> 1000" if needed is None else str(needed)
-        rows.append((pair["effect"], pair["alias"], *figures, count))
-    return Table(title, names, tuple(rows), words=("effect", "or"))
+    rows = (
+        {
+            "effect": pair["effect"],
+            "or": pair["alias"],
+            "measured data": f"{pair['kl_so_far']:.2g}",
+            "with this motion": f"{pair['expected_kl']:.3g}",
+            "motions needed": str(pair["motions_needed"] or "> 1000"),
+        }
+        for pair in outlook["pairs"]
+    )
+    return Table.of(title, rows, words=("effect", "or"))
 
 
 def motion_sentence(motion: Motion) -> str:
@@ -213,18 +224,10 @@ def motion_sentence(motion: Motion) -> str:
 
 def motion_data(motion: Motion) -> dict[str, Any]:
     """A motion for `--json`."""
+    own = (*_NUMBERS, "dense_condition_number", "improved", "status", "note", "seconds",
+           "iterations", "evaluations", "certified")  # fmt: skip
     return {
-        "index": motion.index,
-        "condition_number": motion.condition_number,
-        "stacked_condition_number": motion.stacked_condition_number,
-        "dense_condition_number": motion.dense_condition_number,
-        "improved": motion.improved,
-        "status": motion.status,
-        "note": motion.note,
-        "seconds": motion.seconds,
-        "iterations": motion.iterations,
-        "evaluations": motion.evaluations,
-        "certified": motion.certified,
+        **data_of(motion, *own),
         "doubt": motion.doubt or None,
         "margins": {name: worst_data(worst) for name, worst in motion.margins.items()},
     }
@@ -276,17 +279,9 @@ def comparison_answer(found: Comparison, output: str | None) -> Answer:
     """What `excite compare-random` answers."""
     baseline = found.baseline
     data = {
-        "random": [
-            {
-                "index": m.index,
-                "condition_number": m.condition_number,
-                "stacked_condition_number": m.stacked_condition_number,
-            }
-            for m in baseline.motions
-        ],
+        "random": [data_of(motion, *_NUMBERS) for motion in baseline.motions],
         "optimized": [motion_data(m) for m in found.result.motions],
-        "candidates": baseline.candidates,
-        "admissible": baseline.admissible,
+        **data_of(baseline, "candidates", "admissible"),
         "seconds": {"optimized": found.seconds, "random": baseline.seconds},
         "output": output,
     }
@@ -296,32 +291,22 @@ def comparison_answer(found: Comparison, output: str | None) -> Answer:
 
 def comparison_parts(found: Comparison) -> Parts:
     """The paper's Tables I and II side by side, and how long both took."""
-    return [_table(found), _comparison_in_words(found)]
+    table = pairs_of_numbers_table(found.result.motions, found.baseline.motions)
+    return [table, _comparison_in_words(found)]
 
 
-def _table(found: Comparison) -> Table:
-    optimized, random = found.result.motions, found.baseline.motions
+def pairs_of_numbers_table(optimized: Sequence[Motion], random: Sequence[RandomMotion]) -> Table:
+    """Condition numbers, own and stacked, motion by motion."""
     rows = []
-    for index in range(max(len(optimized), len(random))):
-        first = optimized[index] if index < len(optimized) else None
-        second = random[index] if index < len(random) else None
-        ratio = (
-            f"{second.stacked_condition_number / first.stacked_condition_number:.2f}"
-            if first and second
-            else ""
-        )
-        rows.append((str(index + 1), *_pair(first), *_pair(second), ratio))
-    title = "Condition numbers, optimised and random (the paper's Tables I, II)"
-    names = (
-        "motion", "optimised", "optimised, stacked", "random", "random, stacked", "stacked ratio",
-    )  # fmt: skip
-    return Table(title, names, tuple(rows))
-
-
-def _pair(motion: Motion | RandomMotion | None) -> tuple[str, str]:
-    if motion is None:
-        return "", ""
-    return f"{motion.condition_number:.1f}", f"{motion.stacked_condition_number:.1f}"
+    for index, (first, second) in enumerate(zip_longest(optimized, random), start=1):
+        row = {"motion": str(index)}
+        for word, motion in (("optimised", first), ("random", second)):
+            row[word] = f"{motion.condition_number:.1f}" if motion else ""
+            row[f"{word}, stacked"] = f"{motion.stacked_condition_number:.1f}" if motion else ""
+        both = first and second
+        ratio = second.stacked_condition_number / first.stacked_condition_number if both else 0.0
+        rows.append({**row, "stacked ratio": f"{ratio:.2f}" if both else ""})
+    return Table.of("Condition numbers, optimised and random (the paper's Tables I, II)", rows)
 
 
 def _comparison_in_words(found: Comparison) -> str:

@@ -1,6 +1,7 @@
-"""Tables of the effects that a diagnosis named, and what each is indistinguishable from."""
+"""What a diagnosis found: effects, what each is indistinguishable from, and what is absorbed."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import nan
 
 from excite_cli.diagnosis.answer_words import FRICTION
@@ -16,16 +17,19 @@ from excite_cli.diagnosis.words import (
     SMALL_PART,
     approximation_in_words,
     by_worth,
+    changes_in_words,
     held_out_in_words,
+    joints_in_words,
     other_name_of,
     p_in_words,
     place_in_words,
+    settled_in_words,
     value_in_words,
     weighed_in_words,
 )
 from excite_cli.identification.fit_words import with_deviation
-from excite_cli.shown.answer import Parts, Table
-from excite_cli.summary.cells import points
+from excite_cli.shown.answer import Detail, Parts, Section, Table
+from excite_cli.summary.cells import percent, points
 
 # Viscous and Coulomb friction of every joint as data sheets give it: a table.
 
@@ -76,29 +80,46 @@ def friction_table(lines: Sequence[FrictionLine]) -> Table:
     )
 
 
-_SIZE = "size ± std"
-_WITHOUT_IT = "held-out, without it"
+_LACKING = (
+    "What the declared model lacks (share: part of the fall of the mean error of all joints; "
+    "the last column: verdict on held-out data, error of the most affected joint without it)"
+)
+_MOST_ABSORBED = 6  # rows that a page shows without being opened
+_SURROGATES = "Surrogate terms (they approximate an effect that has no name)"
 
 
-def effect_parts(found: Diagnosis, verbose: bool) -> Parts:
-    """The named effects, small ones in one line, and what each is indistinguishable from."""
+def found_section(found: Diagnosis, detail: Detail) -> Section:
+    """What was found, absorbed and approximated, and the sentences about them."""
+    parts: Parts = effect_parts(found, detail) if found.effects else []
+    parts += approximation_parts(found, detail)
+    curved = any(line.curved for line in found.friction_lines)
+    parts += [friction_table(found.friction_lines)] if detail and curved else []
+    parts += [*changes_in_words(found), *absorbed_parts(found)]
+    declared = ", ".join(dict.fromkeys(record.kind for record in found.declared))
+    lead = f"Declared: {declared or 'no effect beside the rigid bodies'}."
+    return Section("diagnosis-found", "What was found", tuple(parts), lead)
+
+
+def effect_parts(found: Diagnosis, detail: Detail) -> Parts:
+    """The named effects, small ones apart, and what each is indistinguishable from."""
     everything = len(found.joint_names)
-    curves, own = ([], set()) if verbose else friction_rows(found)
+    curves, own = ([], set()) if detail else friction_rows(found)
     named = [each for each in found.named if not _is_part(each, own)]
     shown, small = by_worth([*curves, *named], found)
-    if verbose or len(small) < 2:  # a line about one is no shorter than the one
+    alone = detail == Detail.PAGE and not shown
+    if detail == Detail.VERBOSE or alone or len(small) < 2:  # a line about one is as long
         shown, small = [*shown, *small], []
-    parts: Parts = [effect_table(shown, everything, verbose)] if shown else []
-    if small:
+    parts: Parts = [effect_table(shown, everything, detail)] if shown else []
+    title = f"{len(small)} small effects (each below {SMALL_PART:.0%} of the error reduction)"
+    if small and detail:
+        parts.append(replace(effect_table(small, everything, detail), title=title, folded=True))
+    elif small:
         listed = "; ".join(
             what_and_where(each.effect, everything)
             + f" ({each.verdict})" * (each.verdict is HeldOutVerdict.NOT_CONFIRMED)
             for each in small
         )
-        parts.append(
-            f"and {len(small)} small effects (each below {SMALL_PART:.0%} of the error reduction): "
-            f"{listed} (--verbose: sizes)"
-        )
+        parts.append(f"and {title}: {listed} (--verbose: sizes)")
     if found.harmful:
         parts.append(
             "Harmful effects stay in the model: held-out data judge it, and choose nothing in it."
@@ -110,7 +131,7 @@ def effect_parts(found: Diagnosis, verbose: bool) -> Parts:
         for each in found.joint_aliases
         if not own & {(one.kind, joint) for one in each.named for joint in one.joints}
     )
-    return [*parts, *(_joint_alias(each, everything) for each in told)]
+    return [*parts, *(joint_alias_in_words(each, everything) for each in told)]
 
 
 def _is_part(named: NamedEffect, own: set[tuple[str, str]]) -> bool:
@@ -119,27 +140,31 @@ def _is_part(named: NamedEffect, own: set[tuple[str, str]]) -> bool:
     return not record.runs and len(record.joints) == 1 and (record.kind, record.joints[0]) in own
 
 
-def effect_table(shown: Sequence[NamedEffect], everything: int, verbose: bool) -> Table:
-    """Effects with their sizes and evidence; `everything`: how many joints the robot has."""
-    rows = tuple(
-        (
-            named.effect.kind,
-            place_in_words(named.effect, everything),
-            "\n".join(value_in_words(name, value) for name, value in named.parameters.items()),
-            *([p_in_words(named.p_value, named.least_p)] if verbose else []),
-            points(named.error_reduction),
-            held_out_in_words(named),
-        )
-        for named in shown
-    )
-    return Table(
-        "What the declared model lacks (share: part of the fall of the mean error of all joints; "
-        "the last column: verdict on held-out data, error of the most affected joint without it)",
-        ("effect", "where", _SIZE, *(["p"] if verbose else []), "share", _WITHOUT_IT),
-        rows,
-        left=("effect",),
-        words=("where", _SIZE, _WITHOUT_IT),
-    )
+def effect_table(
+    shown: Sequence[NamedEffect], everything: int, detail: Detail, title: str = _LACKING
+) -> Table:
+    """Effects with their sizes and evidence; `everything`: how many joints the robot has.
+
+    Of what is only approximated, also what it may be.
+    """
+    rows = []
+    for named in shown:
+        sizes = (value_in_words(name, value) for name, value in named.parameters.items())
+        row = {
+            "effect": named.effect.kind,
+            "where": place_in_words(named.effect, everything),
+            "size ± std": "\n".join(sizes),
+        }
+        if detail:
+            row["p"] = p_in_words(named.p_value, named.least_p)
+            row["gain"] = percent(named.gain)
+        row["share"] = points(named.error_reduction)
+        row["held-out, without it"] = held_out_in_words(named)
+        if named.approximates:
+            row["true form"] = approximation_in_words(named.approximates)
+        rows.append(row)
+    words = ("where", "size ± std", "held-out, without it", "true form")
+    return Table.of(title, rows, left=("effect",), words=words)
 
 
 def other_names(named: NamedEffect, everything: int) -> list[str]:
@@ -153,7 +178,8 @@ def other_names(named: NamedEffect, everything: int) -> list[str]:
     return found
 
 
-def _joint_alias(alias: JointAlias, everything: int) -> str:
+def joint_alias_in_words(alias: JointAlias, everything: int) -> str:
+    """What a pair, or one beside a pair, is indistinguishable from."""
     named, others = (
         " + ".join(what_and_where(one, everything) for one in side)
         for side in (alias.named, alias.others)
@@ -170,15 +196,15 @@ def what_and_where(record: EffectRecord, everything: int) -> str:
     return f"{record.kind} on {place_in_words(record, everything)}"
 
 
-def approximation_parts(found: Diagnosis, verbose: bool) -> Parts:
+def approximation_parts(found: Diagnosis, detail: Detail) -> Parts:
     """Effects that lower the error but only come near what is there, and what that may be.
 
     Not those of friction that is told as one; what is not confirmed in one line.
     """
-    own, everything = set() if verbose else friction_rows(found)[1], len(found.joint_names)
+    own, everything = set() if detail else friction_rows(found)[1], len(found.joint_names)
     every = [each for each in found.approximations if not _is_part(each, own)]
-    shown = [each for each in every if verbose or each.verdict is HeldOutVerdict.CONFIRMED]
-    parts: Parts = [_approximation_table(shown, everything)] if shown else []
+    shown = [each for each in every if detail or each.verdict is HeldOutVerdict.CONFIRMED]
+    parts: Parts = [effect_table(shown, everything, detail, _SURROGATES)] if shown else []
     if others := [each for each in every if each not in shown]:
         listed = "; ".join(
             what_and_where(each.effect, everything)
@@ -189,22 +215,23 @@ def approximation_parts(found: Diagnosis, verbose: bool) -> Parts:
     return parts
 
 
-def _approximation_table(shown: Sequence[NamedEffect], everything: int) -> Table:
-    rows = tuple(
-        (
-            each.effect.kind,
-            place_in_words(each.effect, everything),
-            "\n".join(value_in_words(name, value) for name, value in each.parameters.items()),
-            points(each.error_reduction),
-            held_out_in_words(each),
-            approximation_in_words(each.approximates) if each.approximates else "",
-        )
-        for each in shown
+def absorbed_parts(found: Diagnosis) -> Parts:
+    """Candidates that would show as other values of parameters: a table, if there are any."""
+    if not found.absorbed:
+        return []
+    rows = (
+        {
+            "effect": each.kind,
+            "where": joints_in_words(each.joints, len(found.joint_names)),
+            "confounded with": ", ".join(each.by),
+        }
+        for each in found.absorbed
     )
-    return Table(
-        "Surrogate terms (they approximate an effect that has no name)",
-        ("effect", "where", _SIZE, "share", _WITHOUT_IT, "true form"),
+    table = Table.of(
+        "Not identifiable: confounded with parameters of the model",
         rows,
-        left=("effect",),
-        words=("where", _SIZE, _WITHOUT_IT, "true form"),
+        left=("effect", "where"),
+        words=("confounded with",),
+        folded=len(found.absorbed) > _MOST_ABSORBED,
     )
+    return [table, *settled_in_words(found)]

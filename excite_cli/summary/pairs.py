@@ -11,24 +11,17 @@ from excite_cli.excitation.not_modelled import (
     not_modelled,
 )
 from excite_cli.excitation.problem import Problem
+from excite_cli.fields import data_of
 from excite_cli.geometry.reasons import DroppedPair, Why, dropped_in_words, reason_in_words
 from excite_cli.proof.certificate import Worst
 from excite_cli.robot.model import links_by_joint
-
-# Motions that do not count as proved, in words.
-
-# Worst margins for scripts.
 
 
 def worst_data(worst: Worst) -> dict[str, Any]:
     """A worst margin for `--json`."""
     return {
-        "margin": worst.margin,
-        "share": worst.share,
-        "unit": worst.unit,
+        **data_of(worst, "margin", "share", "unit", "time", "violations"),
         "where": worst.label,
-        "time": worst.time,
-        "violations": worst.violations,
     }
 
 
@@ -77,10 +70,10 @@ def pairs_in_words(problem: Problem) -> list[str]:
     told = "; ".join(dropped_in_words(pair) for pair in left[:_TOLD])
     more = f"; and {len(left) - _TOLD} more (--json has all)" if len(left) > _TOLD else ""
     names = f" Not checked: {told}{more}." if left else ""
-    return [*unguarded_in_words(problem), *(f"{each}{names}" for each in counted(problem))]
+    return [*unguarded_in_words(problem), *(f"{each}{names}" for each in counted_pairs(problem))]
 
 
-def counted(problem: Problem) -> list[str]:
+def counted_pairs(problem: Problem) -> list[str]:
     """How many pairs are checked, in one sentence; empty where there are none."""
     kept, left = kept_apart(problem), len(unjudged(problem))
     if not kept and not left:

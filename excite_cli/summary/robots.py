@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 
+from excite_cli.fields import data_of
 from excite_cli.robot.description import EXAMPLE_PREFIX
-from excite_cli.robot.overview import DescribedJoint, DescribedRobot, Glance
+from excite_cli.robot.overview import DescribedRobot, Glance
 from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
 
@@ -18,20 +19,23 @@ def robots_answer(found: Sequence[Glance], names: Sequence[str]) -> Answer:
             "collision geometry": each.collision,
         }
         lacks = ", ".join(word for word, is_there in there.items() if not is_there)
-        rows.append((each.name, each.kind, str(each.joints), lacks, ", ".join(each.others)))
-    columns = ("name", "kind", "joints", "lacks", "also called")
+        rows.append(
+            {
+                "name": each.name,
+                "kind": each.kind,
+                "joints": str(each.joints),
+                "lacks": lacks,
+                "also called": ", ".join(each.others),
+            }
+        )
     left, words = ("name", "kind"), ("lacks", "also called")
-    table = Table("Robots of example-robot-data", columns, tuple(rows), left, words)
+    table = Table.of("Robots of example-robot-data", rows, left, words)
     hint = f"In a config: robot: {{urdf: {EXAMPLE_PREFIX}NAME}}. Joints: excite robots NAME"
     data = {
         "robots": [f"{EXAMPLE_PREFIX}{name}" for name in names],
         "details": {
             each.name: {
-                "kind": each.kind,
-                "joints": each.joints,
-                "inertias": each.inertias,
-                "visual": each.visual,
-                "collision": each.collision,
+                **data_of(each, "kind", "joints", "inertias", "visual", "collision"),
                 "also_called": list(each.others),
                 "file": str(each.path),
             }
@@ -43,19 +47,9 @@ def robots_answer(found: Sequence[Glance], names: Sequence[str]) -> Answer:
 
 def robot_answer(found: DescribedRobot) -> Answer:
     """What `excite robots NAME` answers."""
+    own = ("kind", "lower", "upper", "velocity", "effort", "links", "followers")
     data = {
-        "joints": {
-            joint.name: {
-                "kind": joint.kind,
-                "lower": joint.lower,
-                "upper": joint.upper,
-                "velocity": joint.velocity,
-                "effort": joint.effort,
-                "links": list(joint.links),
-                "followers": list(joint.followers),
-            }
-            for joint in found.joints
-        },
+        "joints": {joint.name: data_of(joint, *own) for joint in found.joints},
         "base_links": list(found.base_links),
     }
     return Answer(tuple(robot_parts(found)), data)
@@ -65,24 +59,24 @@ def robot_parts(found: DescribedRobot) -> Parts:
     """Joints with their limits, and the links of the base."""
     sliding = any(joint.kind == "prismatic" for joint in found.joints)
     unit = "rad, rad/s, N·m; prismatic: m, m/s, N" if sliding else "rad, rad/s, N·m"
-    names = ("joint", *(("kind",) * sliding), "lower", "upper", "speed", "effort", "links")
-    rows = tuple(
-        (
-            joint.name,
-            *((joint.kind,) * sliding),
-            *_limits(joint),
-            ", ".join(joint.links),
-        )
+    rows = (
+        {
+            "joint": joint.name,
+            **({"kind": joint.kind} if sliding else {}),
+            "lower": _limit(joint.lower),
+            "upper": _limit(joint.upper),
+            "speed": _limit(joint.velocity),
+            "effort": _limit(joint.effort),
+            "links": ", ".join(joint.links),
+        }
         for joint in found.joints
     )
-    left = ("joint", *(("kind",) * sliding))
-    table = Table(f"{_in_words(found)} ({unit})", names, rows, left, ("links",))
+    table = Table.of(f"{_in_words(found)} ({unit})", rows, ("joint", "kind"), ("links",))
     return [table, f"links fixed to the world: {', '.join(found.base_links)}"]
 
 
-def _limits(joint: DescribedJoint) -> list[str]:
-    values = (joint.lower, joint.upper, joint.velocity, joint.effort)
-    return [f"{value:.4g}" if abs(value) < float("inf") else "-" for value in values]
+def _limit(value: float) -> str:
+    return f"{value:.4g}" if abs(value) < float("inf") else "-"
 
 
 def _in_words(found: DescribedRobot) -> str:

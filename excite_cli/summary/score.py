@@ -3,13 +3,18 @@
 from math import isfinite, isnan
 from typing import Any
 
+import numpy as np
+
 from excite_cli.diagnosis.words import place_in_words, title_of, value_in_words
+from excite_cli.fields import data_of
 from excite_cli.identification.fit_words import short_number
+from excite_cli.report.chart import Colour
+from excite_cli.report.plot import Curve, Panel, Plot
 from excite_cli.scoring.records import RunExplanation, Score, ScoredRun
 from excite_cli.scoring.thresholds import Thresholds
-from excite_cli.shown.answer import Answer, Parts, Table
+from excite_cli.shown.answer import Answer, Charts, KeyFigure, Parts, Section, Table, parts_of
 from excite_cli.shown.record import show
-from excite_cli.summary.cells import figure, percent
+from excite_cli.summary.cells import figure, findings_data, percent
 
 # Thresholds of a collision detector in words and as a table.
 
@@ -33,6 +38,7 @@ show(Thresholds, _in_words, thresholds_parts)
 
 
 _TOLD = 3  # runs in the sentence
+_COLOURS: tuple[Colour, ...] = ("blue", "vermilion", "green", "purple", "ink", "muted")
 
 
 def score_answer(found: Score) -> Answer:
@@ -42,7 +48,55 @@ def score_answer(found: Score) -> Answer:
 
 def score_parts(found: Score) -> Parts:
     """A sentence, the runs, and errors per joint."""
-    return [*sentences(found), runs_table(found), joints_table(found)]
+    return [*sentences(found), *parts_of(score_sections(found))]
+
+
+def score_sections(found: Score) -> list[Section]:
+    """Ratios over the runs, the runs with their reasons, and the joints."""
+    ratios = [Charts((_plot(found),))] if found.made is not None and len(found.runs) > 1 else []
+    every = [
+        Section("ratios", "Residual over the runs", tuple(ratios)),
+        Section("runs", "Runs", (runs_table(found),)),
+        Section("joints", "Joints", (joints_table(found),)),
+    ]
+    return [section for section in every if section.blocks]
+
+
+def score_figures(score: Score) -> tuple[KeyFigure, ...]:
+    """What sums a score up."""
+    made = "" if score.made is None else f"{score.made.mean_relative_moving:.2%} when it was made"
+    return (
+        KeyFigure("error on these runs, moving", f"{score.error.mean_relative_moving:.2%}", made),
+        KeyFigure(
+            "runs beyond the model's tolerance",
+            f"{len(score.alarms)} of {len(score.runs)}",
+            "tolerance: residual of the model on its own data, in proportion to the torque",
+        ),
+    )
+
+
+def _plot(score: Score) -> Plot:
+    count = len(score.runs)
+    series = tuple(
+        Curve(
+            joint,
+            np.array([run.ratio.get(joint, np.nan) for run in score.runs]),
+            _COLOURS[k % len(_COLOURS)],
+            "joined",
+        )
+        for k, joint in enumerate(score.joint_names)
+    )
+    alarms = ", ".join(run.name for run in score.alarms) or "none"
+    return Plot(
+        "RMS of the residual over the model's tolerance",
+        f"Ratio of every joint over {count} runs; alarms: {alarms}.",
+        "run",
+        np.arange(1.0, count + 1.0),
+        (Panel("ratio", series, height=240),),
+        caption="1: as on the day the model was made. Runs are numbered as in the table.",
+        wide=True,
+        counted=True,
+    )
 
 
 def sentences(found: Score) -> list[str]:
@@ -106,21 +160,21 @@ def _reason(reason: RunExplanation, found: Score) -> str:
 
 def runs_table(found: Score) -> Table:
     """Every run with its error, state and likely reason."""
-    rows = tuple(
-        (
-            run.name,
-            f"{run.seconds:.4g}",
-            percent(run.error.mean_relative_moving),
-            percent(run.error.mean_relative),
-            _worst(run),
-            "ALARM" if run.alarm else "" if run.judged or found.made is None else "not judged",
-            ", ".join(title_of(each.effect.kind) for each in run.reasons) if run.alarm else "",
-        )
+    rows = (
+        {
+            "run": run.name,
+            "seconds": f"{run.seconds:.4g}",
+            "error, moving": percent(run.error.mean_relative_moving),
+            "error, all": percent(run.error.mean_relative),
+            "multiple": _worst(run),
+            "state": "ALARM" * run.alarm or "not judged" * bool(found.made and not run.judged),
+            "likely reason": ", ".join(title_of(each.effect.kind) for each in run.reasons)
+            * run.alarm,
+        }
         for run in found.runs
     )
-    return Table(
+    return Table.of(
         "Runs: torque error, and its part beyond friction as a multiple of what the model leaves",
-        ("run", "seconds", "error, moving", "error, all", "multiple", "state", "likely reason"),
         rows,
         left=("run", "state"),
         words=("likely reason",),
@@ -136,35 +190,22 @@ def _worst(run: ScoredRun) -> str:
 def joints_table(found: Score) -> Table:
     """Every joint's error over all runs, beside that when the model was made."""
     made = found.made
-    rows = tuple(
-        (
-            joint,
-            percent(found.error.relative_moving[joint]),
-            percent(made.relative_moving[joint]) if made else "",
-            figure(found.error.rms[joint]),
-            figure(made.rms[joint]) if made else "",
-            figure(found.noise[joint]) if joint in found.noise else "",
-            unit,
-            max(found.runs, key=lambda run: _ratio(run, joint)).name if made else "",
-        )
+    rows = (
+        {
+            "joint": joint,
+            "error, moving": percent(found.error.relative_moving[joint]),
+            "when made": percent(made.relative_moving[joint]) if made else "",
+            "RMS, all": figure(found.error.rms[joint]),
+            "RMS when made": figure(made.rms[joint]) if made else "",
+            "noise": figure(found.noise[joint]) if joint in found.noise else "",
+            "unit": unit,
+            "worst run": max(found.runs, key=lambda run: _ratio(run, joint)).name if made else "",
+        }
         for joint, unit in zip(found.joint_names, found.units, strict=True)
         if not isnan(found.error.rms[joint])  # its torque was not measured
     )
-    return Table(
-        "Joints: torque error over all runs, and when the model was made",
-        (
-            "joint",
-            "error, moving",
-            "when made",
-            "RMS, all",
-            "RMS when made",
-            "noise",
-            "unit",
-            "worst run",
-        ),
-        rows,
-        left=("joint", "unit", "worst run"),
-    )
+    title = "Joints: torque error over all runs, and when the model was made"
+    return Table.of(title, rows, left=("joint", "unit", "worst run"))
 
 
 def _ratio(run: ScoredRun, joint: str) -> float:
@@ -177,50 +218,26 @@ def score_data(found: Score) -> dict[str, Any]:
     return {
         "good": not found.alarms,
         "answer": sentences(found),
-        "model": found.model,
+        **data_of(found, "model", "error", "made", "noise"),
+        "findings": findings_data(found.findings),
         "runs": [_run_data(run, found) for run in found.runs],
-        "error": found.error.as_data(),
-        "made": None if found.made is None else found.made.as_data(),
-        "noise": found.noise,
-        "findings": [
-            {"kind": f.kind, "severity": f.severity, "run": f.run, "text": f.text}
-            for f in found.findings
-        ],
     }
 
 
 def _run_data(run: ScoredRun, found: Score) -> dict[str, Any]:
+    own = ("name", "file", "seconds", "allowed", "ratio", "peak", "alarm", "judged", "covariates")
     return {
-        "name": run.name,
-        "file": run.file,
-        "seconds": run.seconds,
-        "relative_moving": run.error.relative_moving,
-        "relative": run.error.relative,
-        "rms": run.error.rms,
-        "samples": run.error.samples,
-        "allowed": run.allowed,
-        "ratio": run.ratio,
-        "peak": run.peak,
-        "alarm": run.alarm,
-        "judged": list(run.judged),
+        **data_of(run, *own, "epoch"),
+        **data_of(run.error, "relative_moving", "relative", "rms", "samples"),
         "joints": list(run.left),
         "reasons": [
             {
-                "kind": each.effect.kind,
-                "joints": list(each.effect.joints),
-                "shape": each.effect.shape,
-                "values": list(each.effect.values),
-                "parameters": {
-                    name: {"value": p.value, "std": p.std, "unit": p.unit}
-                    for name, p in each.parameters.items()
-                },
-                "share": each.share,
+                **data_of(each.effect, "kind", "joints", "shape", "values"),
+                **data_of(each, "parameters", "share"),
             }
             for each in run.reasons
         ],
         "in_words": in_words(run, found),
-        "covariates": run.covariates,
-        "epoch": run.epoch,
     }
 
 
@@ -233,20 +250,21 @@ def _run_in_words(run: ScoredRun) -> str:
 
 
 def _run_parts(run: ScoredRun) -> Parts:
-    names = ("joint", "where moving", "RMS", "beyond friction", "tolerance", "ratio")
-    rows = tuple(
-        (
-            joint,
-            percent(run.error.relative_moving[joint]),
-            figure(rms),
-            figure(run.ratio[joint] * run.allowed[joint]) if joint in run.ratio else "",
-            figure(run.allowed[joint]) if joint in run.allowed else "",
-            figure(run.ratio[joint]) if joint in run.ratio else "",
+    rows = []
+    for joint, rms in run.error.rms.items():
+        ratio, allowed = run.ratio.get(joint), run.allowed.get(joint)
+        rows.append(
+            {
+                "joint": joint,
+                "where moving": percent(run.error.relative_moving[joint]),
+                "RMS": figure(rms),
+                "beyond friction": "" if ratio is None else figure(ratio * run.allowed[joint]),
+                "tolerance": "" if allowed is None else figure(allowed),
+                "ratio": "" if ratio is None else figure(ratio),
+            }
         )
-        for joint, rms in run.error.rms.items()
-    )
-    bold = tuple(k for k, row in enumerate(rows) if row[0] in run.left)
-    return [_run_in_words(run), Table("", names, rows, left=("joint",), bold=bold)]
+    bold = tuple(k for k, row in enumerate(rows) if row["joint"] in run.left)
+    return [_run_in_words(run), Table.of("", rows, left=("joint",), bold=bold)]
 
 
 show(ScoredRun, _run_in_words, _run_parts)

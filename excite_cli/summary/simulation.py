@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from excite_cli.fields import data_of
 from excite_cli.scoring.records import Replay
 from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
@@ -19,25 +20,17 @@ def replay_answer(found: Replay) -> Answer:
 
 def replay_parts(found: Replay) -> Parts:
     """A sentence, the deviations, and what the simulator cannot hold."""
-    rows = tuple(
-        (
-            joint,
-            "" if found.before is None else f"{1e3 * found.before[joint]:.2f}",
-            f"{1e3 * after:.2f}",
-            "mm" if joint in found.sliding else "mrad",
-        )
+    rows = (
+        {
+            "joint": joint,
+            "URDF": "" if found.before is None else f"{1e3 * found.before[joint]:.2f}",
+            "model": f"{1e3 * after:.2f}",
+            "unit": "mm" if joint in found.sliding else "mrad",
+        }
         for joint, after in found.after.items()
     )
-    return [
-        _replay_in_words(found),
-        Table(
-            "Deviation from the measured motion, RMS",
-            ("joint", "URDF", "model", "unit"),
-            rows,
-            left=("joint", "unit"),
-        ),
-        *found.notes,
-    ]
+    table = Table.of("Deviation from the measured motion, RMS", rows, left=("joint", "unit"))
+    return [_replay_in_words(found), table, *found.notes]
 
 
 def _replay_in_words(found: Replay) -> str:
@@ -62,12 +55,8 @@ def _data(found: Replay) -> dict[str, Any]:
         "good": found.good,
         "answer": _replay_in_words(found),
         "runs": list(found.names),
-        "seconds": found.seconds,
-        "before": found.before,
-        "after": found.after,
         "mean": {"before": before, "after": after},
-        "lost": list(found.lost),
-        "notes": list(found.notes),
+        **data_of(found, "seconds", "before", "after", "lost", "notes"),
     }
 
 
@@ -116,19 +105,20 @@ def _run_table(found: Simulation) -> Table:
     for run in found.dataset.runs:
         error = 1e3 * found.tracking[run.name]
         worst = int(np.argmax(error))
-        rows.append(
-            (
-                run.name,
-                str(len(run.t)),
-                f"{run.duration:.2f}",
-                *(f"{np.sqrt(np.mean(error[of] ** 2)):.3f}" for _, of in kinds),
-                f"{error[worst]:.3f} {'mm' if slides[worst] else 'mrad'}",
-                names[worst],
-            )
-        )
-    tracking = [f"RMS over joints [{unit}]" for unit, _ in kinds]
-    columns = ("run", "samples", "seconds", *tracking, "worst joint's RMS", "joint")
-    return Table("Runs (tracking error)", columns, tuple(rows), left=("run", "joint"))
+        tracking = {
+            f"RMS over joints [{unit}]": f"{np.sqrt(np.mean(error[of] ** 2)):.3f}"
+            for unit, of in kinds
+        }
+        row = {
+            "run": run.name,
+            "samples": str(len(run.t)),
+            "seconds": f"{run.duration:.2f}",
+            **tracking,
+            "worst joint's RMS": f"{error[worst]:.3f} {'mm' if slides[worst] else 'mrad'}",
+            "joint": names[worst],
+        }
+        rows.append(row)
+    return Table.of("Runs (tracking error)", rows, left=("run", "joint"))
 
 
 def _effect_table(records: list[dict[str, Any]]) -> Table:
@@ -138,22 +128,16 @@ def _effect_table(records: list[dict[str, Any]]) -> Table:
             f"{name} {each['value'] + 0.0:.4g}" + f" {each['unit']}" * (each["unit"] != "1")
             for name, each in record["parameters"].items()
         )
-        rows.append(
-            (
-                record["kind"],
-                ", ".join(record["joints"]),
-                ", ".join(values),
-                ", ".join(record["runs"]) or "all",
-                "yes" if record["declared"] else "no",
-            )
-        )
-    return Table(
-        "Effects in the robot",
-        ("effect", "joints", "parameters", "runs", "in the config"),
-        tuple(rows),
-        left=("effect", "in the config"),
-        words=("joints", "parameters", "runs"),
-    )
+        row = {
+            "effect": record["kind"],
+            "joints": ", ".join(record["joints"]),
+            "parameters": ", ".join(values),
+            "runs": ", ".join(record["runs"]) or "all",
+            "in the config": "yes" if record["declared"] else "no",
+        }
+        rows.append(row)
+    left, words = ("effect", "in the config"), ("joints", "parameters", "runs")
+    return Table.of("Effects in the robot", rows, left, words)
 
 
 def _in_words(found: Simulation) -> str:

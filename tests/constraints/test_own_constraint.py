@@ -2,6 +2,10 @@
 
 import numpy as np
 import pytest
+from excite_cli.report.campaign import RebuiltResult
+from excite_cli.report.margin_section import margin_section
+from excite_cli.report.motion_figure import draw_margins
+from excite_cli.report.motion_section import motion_section
 
 from excite_cli.config.load_spec import parse_spec, spec_as_yaml
 from excite_cli.constraints.catalogue import OWN
@@ -10,10 +14,6 @@ from excite_cli.excitation.admissible import path_of, worst_margins
 from excite_cli.excitation.inspection import Look, inspect
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
-from excite_cli.report.campaign import RebuiltResult
-from excite_cli.report.margin_section import margin_section
-from excite_cli.report.motion_figure import draw_margins
-from excite_cli.report.motion_section import motion_section
 from excite_cli.trajectory.fade import Segment
 from excite_cli.view.instants import instants_of
 from excite_cli.view.scene import build_scene

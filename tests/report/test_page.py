@@ -5,20 +5,21 @@ import re
 import pytest
 
 from excite_cli.errors import MissingExtraError
-from excite_cli.report.assembly import Source, page_of
 from excite_cli.report.chart import Chart
-from excite_cli.report.page import (
+from excite_cli.report.page import render
+from excite_cli.report.rows_chart import Axis, Bar, Mark, Row, rows_chart
+from excite_cli.shown.answer import (
     Charts,
-    ChoiceBlock,
+    Choice,
+    Command,
     Fold,
     KeyFigure,
     Page,
-    PageSection,
-    TableBlock,
+    Section,
+    Table,
     Text,
-    render,
 )
-from excite_cli.report.rows_chart import Axis, Bar, Mark, Row, rows_chart
+from excite_cli.summary.assembly import Source, page_of
 from tests.report.case import Case
 from tests.report.structure import Structure
 
@@ -35,13 +36,15 @@ def _page(word: str) -> Page:
     chart = _chart(word)
     blocks = (
         Charts((chart, _chart(word)), word),
-        ChoiceBlock(word, ((word, (chart,)), ("second", (Text(word),)))),
-        TableBlock((word, "b"), ((word, "1"),), word, frozenset({1}), word, True),
-        TableBlock(("a",), ((word,),), wordy=frozenset({0})),
+        Choice(word, ((word, (chart,)), ("second", (Text(word),)))),
+        Table(word, (word, "b"), ((word, "1"),), left=(word,), note=word, folded=True),
+        Table("", ("a",), ((word,), ("one\ntwo",)), words=("a",)),
+        Command((word,)),
+        word,
         Fold(word, (Text(word, "code"), Text(word, "bad"))),
     )
-    section = PageSection("one", word, blocks, word)
-    return Page(word, word, (KeyFigure(word, word, word),), (section, PageSection("two", "B", ())))
+    section = Section("one", word, blocks, word)
+    return Page(word, word, (KeyFigure(word, word, word),), (section, Section("two", "B", ())))
 
 
 @pytest.fixture(scope="module")
@@ -70,8 +73,9 @@ def test_tags_match_and_addresses_are_unique(page: str) -> None:
 def test_blocks_of_every_kind_are_drawn() -> None:
     """The template knows kinds by the names of their classes."""
     drawn = render(_page("torque"))
-    plain = render(Page("torque", "", (), (PageSection("one", "torque", ()),)))
+    plain = render(Page("torque", "", (), (Section("one", "torque", ()),)))
     signs = ("<svg", '<div class="grid">', "<table>", "<details>", "<select>", "<pre")
+    assert "one<br>two" in drawn
     for sign in signs:
         assert drawn.count(sign) > plain.count(sign), sign
 
@@ -113,7 +117,7 @@ def test_hostile_names_stay_names() -> None:
 
 def test_commands_between_backticks_are_code() -> None:
     blocks = (Text("run `excite <check>` now"), Text("a ` alone"))
-    text = render(Page("t", "s", (), (PageSection("a", "A", blocks),)))
+    text = render(Page("t", "s", (), (Section("a", "A", blocks),)))
     assert "run <code>excite &lt;check&gt;</code> now" in text
     assert "a ` alone" in text
 

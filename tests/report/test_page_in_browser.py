@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from excite_cli.report.assembly import Source, page_of
 from excite_cli.report.page import render
+from excite_cli.summary.assembly import Source, page_of
 from tests.browser import started_browser
 from tests.report.case import Case
 

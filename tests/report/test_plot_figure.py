@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from excite_cli.report.diagnosis_figures import draw_plots
 from excite_cli.report.plot import Curve, Panel, Plot, merged
+from excite_cli.report.plot_figure import draw_plots
 from excite_cli.report.style import VERMILION, WIDTH
 
 X = np.linspace(0.0, 4.0, 9)

@@ -20,15 +20,15 @@ def test_the_reason_comes_first_and_seconds_add_up() -> None:
         "pace": "30%",
         "seconds": "12",
         "efficiency": "",
-        "before": "10.00%",
-        "after": "2.00%",
+        "declared": "10.00%",
+        "with effects": "2.00%",
         "torque std [σ]": "0.3",
         "effects": "spring on elbow",
     }
     assert "1 rounds, 1 motions, 12 s of motion" in str(answer.parts[2])
     assert answer.parts[-1] == "page: place/page.html"
     assert answer.data["seconds"] == 12.5
-    assert answer.data["rounds"][0]["motions"][0]["rejected"] == ("no",)
+    assert answer.data["rounds"][0]["motions"][0]["rejected"] == ["no"]
 
 
 def test_only_a_complete_one_is_good() -> None:

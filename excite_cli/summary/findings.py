@@ -1,10 +1,11 @@
 """What was noticed about data, and every choice made between the file and the fit."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-from excite_cli.measurement.dataset import Finding
-from excite_cli.report.page import Block, TableBlock, Text
+from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.identification.stored_model import StoredFit
+from excite_cli.shown.answer import Block, Fold, Table, Text
 
 _WORDS = {
     "recorded_rate": "recorded rate [Hz]",
@@ -29,27 +30,30 @@ _WORDS = {
 _SHARES = ("standstill_share", "invalid_share")
 
 
-def findings_blocks(findings: Sequence[Finding]) -> tuple[Block, ...]:
-    """Warnings first; a sentence if there is nothing to tell."""
-    if not findings:
-        return (Text("Nothing was noticed about the data.", "good"),)
-    ranked = sorted(findings, key=lambda each: each.severity != "warning")
-    return tuple(
+def data_blocks(
+    found: Diagnosis | StoredFit, joint_names: Sequence[str], tables: Sequence[Table] = ()
+) -> list[Block]:
+    """What was noticed, warnings first; `tables`; every choice by its name; config, versions."""
+    ranked = sorted(found.findings, key=lambda each: each.severity != "warning")
+    noticed = (
         Text(
             f"{each.run}: {each.text}" if each.run and each.run not in each.text else each.text,
             "bad" if each.severity == "warning" else "plain",
         )
         for each in ranked
     )
-
-
-def processing_table(processing: Mapping[str, Any], joint_names: Sequence[str]) -> TableBlock:
-    """Every choice by its name in words."""
     rows = tuple(
         (_WORDS.get(name, name.replace("_", " ")), _value(name, value, joint_names))
-        for name, value in processing.items()
+        for name, value in found.processing.items()
     )
-    return TableBlock(("choice", "value"), rows, title="Processing of the data", folded=True)
+    columns = ("choice", "value")
+    return [
+        *(noticed if ranked else [Text("Nothing was noticed about the data.", "good")]),
+        *tables,
+        Table("Processing of the data", columns, rows, left=columns, folded=True),
+        Fold("Configuration", (Text(found.config, "code"),)),
+        ", ".join(f"{name} {version}" for name, version in found.versions.items()),
+    ]
 
 
 def _value(name: str, value: Any, joint_names: Sequence[str]) -> str:

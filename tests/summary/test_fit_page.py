@@ -11,16 +11,17 @@ from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.identification.identify import identify
 from excite_cli.identification.stored_model import StoredFit
-from excite_cli.report.fit_sections import (
+from excite_cli.report.page import render
+from excite_cli.report.parameter_chart import parameter_charts
+from excite_cli.shown.answer import Choice, Page, Table
+from excite_cli.store.fit_file import read_fit, write_fit
+from excite_cli.summary.identification import (
+    _stored_parts,
     correlated_parameters,
     fit_figures,
     fit_sections,
-    parameter_charts,
     parameter_section,
-    time_section,
 )
-from excite_cli.report.page import ChoiceBlock, Page, TableBlock, Text, render
-from excite_cli.store.fit_file import read_fit, write_fit
 from tests.identification.synthetic import measured
 from tests.report.structure import Structure
 from tests.robot.random_robots import random_robot
@@ -41,9 +42,9 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> StoredFit:
 def test_the_page_is_sound_and_says_what_matters(stored: StoredFit) -> None:
     floor = {joint: 0.5 * stored.error.rms[joint] for joint in stored.fit.joint_names}
     stored = replace(stored, noise_floor=floor, traces=stored.traces[1:])
-    text = Structure(render(Page("f", "", fit_figures(stored), fit_sections(stored)))).text
+    text = Structure(render(Page("f", "", fit_figures(stored), tuple(fit_sections(stored))))).text
     assert f"{stored.error.mean_relative:.2%}" in text
-    assert "Held-out: r3" in text
+    assert "r3 took no part in the fit" in text
     assert stored.closed_loop_bias[1:] in text
     for name in stored.fit.names:
         assert name in text
@@ -72,27 +73,30 @@ def test_an_unseen_parameter_has_no_end(stored: StoredFit) -> None:
     fit = replace(stored.fit, std=std, relative_std=std, covariance=covariance,
                   identifiable=np.isfinite(std))  # fmt: skip
     found = parameter_section(fit)
-    assert any(
-        "> 1000%" in row for b in found.blocks if isinstance(b, TableBlock) for row in b.rows
-    )
+    assert any("> 1000%" in row for b in found.blocks if isinstance(b, Table) for row in b.rows)
 
 
 def test_strong_correlations_are_listed(stored: StoredFit) -> None:
     std, names = stored.fit.std, stored.fit.names
     covariance = np.diag(std**2)
     (text,) = correlated_parameters(replace(stored.fit, covariance=covariance))
-    assert isinstance(text, Text)
-    assert "No two parameters" in text.text
+    assert "No two parameters" in str(text)
     covariance[0, 2] = covariance[2, 0] = -0.98 * std[0] * std[2]
     (table,) = correlated_parameters(replace(stored.fit, covariance=covariance))
-    assert isinstance(table, TableBlock)
+    assert isinstance(table, Table)
     assert table.rows == ((names[0], names[2], "-0.980"),)
 
 
-def test_runs_in_time_and_files_without(stored: StoredFit) -> None:
-    (choice,) = time_section(stored).blocks
-    assert isinstance(choice, ChoiceBlock)
+def test_runs_in_time(stored: StoredFit) -> None:
+    (choice,) = fit_sections(stored)[2].blocks
+    assert isinstance(choice, Choice)
     assert choice.options[0][0].startswith("r3 (held out")
-    (text,) = time_section(replace(stored, traces=(), torque_units=())).blocks
-    assert isinstance(text, Text)
-    assert "earlier version" in text.text
+    assert fit_sections(replace(stored, traces=()))[2].blocks == ()
+
+
+def test_page_and_terminal_have_the_same_table_of_errors(stored: StoredFit) -> None:
+    told = [part for part in _stored_parts(stored) if isinstance(part, Table)]
+    shown = [block for section in fit_sections(stored) for block in section.blocks]
+    assert [table for table in told if table.title.startswith("Error of the torque")] == [
+        block for block in shown if isinstance(block, Table) and "Error" in block.title
+    ]

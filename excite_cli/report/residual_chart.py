@@ -8,9 +8,9 @@ import numpy as np
 
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.report.chart import thinned
-from excite_cli.report.page import Block, Charts, ChoiceBlock, Text
 from excite_cli.report.plot import Curve, Panel, Plot
 from excite_cli.robot.model import Array
+from excite_cli.shown.answer import Block, Charts, Choice
 
 # Units in which small and large torques read well.
 
@@ -39,18 +39,13 @@ def residuals_in_time(
     traces: Sequence[TorqueTrace], joint_names: Sequence[str], units: Sequence[str]
 ) -> tuple[Block, ...]:
     """A card per joint, a choice of runs; parts that took no part in the fit are shaded."""
-    if not traces:
-        return (
-            Text(
-                "The file holds no torque over time: it was written by an earlier version. Run "
-                "the command again to have it."
-            ),
-        )
     options = tuple(
         (label, (Charts(charts),))
         for label, charts in plots_in_time(traces, joint_names, units).items()
     )
-    return options[0][1] if len(options) == 1 else (ChoiceBlock("Run", options),)
+    if len(options) < 2:
+        return options[0][1] if options else ()
+    return (Choice("Run", options),)
 
 
 def plots_in_time(
@@ -90,10 +85,10 @@ def _card(parts: Sequence[TorqueTrace], j: int, name: str, unit: str, points: in
     measured = _joined([part.measured[at, j] for part in parts])
     predicted = _joined([part.predicted[at, j] for part in parts])
     factor, of_torque = readable_unit(unit, _largest(measured))
-    rest = [Curve("left", measured - predicted, "vermilion")]
+    rest = [Curve("residual", measured - predicted, "vermilion")]
     if before:
         alone = _joined([part.before[at, j] for part in parts if part.before is not None])
-        rest.insert(0, Curve("left before", measured - alone, "muted", "dashed"))
+        rest.insert(0, Curve("residual, declared model", measured - alone, "muted", "dashed"))
     small, of_left = readable_unit(unit, max(_largest(each.y) for each in rest))
     upper = Panel(
         f"{torque_or_force(unit)} [{of_torque}]",
@@ -102,7 +97,7 @@ def _card(parts: Sequence[TorqueTrace], j: int, name: str, unit: str, points: in
             Curve("model", factor * predicted, "blue"),
         ),
     )
-    lower = Panel(f"left [{of_left}]", tuple(replace(each, y=small * each.y) for each in rest))
+    lower = Panel(f"residual [{of_left}]", tuple(replace(each, y=small * each.y) for each in rest))
     mixed = {part.held_out for part in parts} == {False, True}
     return Plot(
         name,

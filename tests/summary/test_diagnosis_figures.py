@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from excite_cli.diagnosis.records import Diagnosis
-from excite_cli.report.diagnosis_figures import figures_of
+from excite_cli.summary.figures import diagnosis_figures as figures_of
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis, make_traces
 
 
@@ -56,7 +56,7 @@ def test_errors_are_those_of_the_records(diagnosis: Diagnosis) -> None:
     labels = [tick.get_text() for tick in relative.get_yticklabels()]
     known = [each for each in joints if each != joints[1]]
     assert labels == [*known, "mean"]
-    (line,) = [each for each in relative.lines if each.get_label() == "after"]
+    (line,) = [each for each in relative.lines if each.get_label() == "with effects"]
     np.testing.assert_allclose(line.get_xdata(), [100 * moving[each] for each in known] + [7.0])
     assert relative.yaxis_inverted()  # the first joint on top
     shown = [tick.get_text() for axes in rms for tick in axes.get_yticklabels()]

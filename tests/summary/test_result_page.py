@@ -10,46 +10,37 @@ from excite_cli.api.loading import load_problem
 from excite_cli.config.load_spec import parse_spec, spec_as_yaml
 from excite_cli.criteria.base import singular_values
 from excite_cli.excitation.stack import Stack
-from excite_cli.report.assembly import Source, campaign_figures, page_of
-from excite_cli.report.campaign import RebuiltResult, in_figures
-from excite_cli.report.compare_section import comparable, compare_results, differences
-from excite_cli.report.condition_section import condition_chart, condition_section
-from excite_cli.report.margin_section import margin_figures, margin_section
-from excite_cli.report.motion_section import drawn_motions, motion_section
-from excite_cli.report.page import (
-    Block,
-    Charts,
-    ChoiceBlock,
-    Page,
-    PageSection,
-    TableBlock,
-    Text,
-    render,
-)
+from excite_cli.report.chart import in_figures
+from excite_cli.report.condition_chart import condition_chart, random_stack
+from excite_cli.report.page import render
 from excite_cli.report.plot import Plot
-from excite_cli.report.weakest_section import weakest_section
+from excite_cli.shown.answer import Block, Charts, Choice, Page, Section, Table, Text
+from excite_cli.summary.assembly import Source, page_of
+from excite_cli.summary.result_page import (
+    condition_section,
+    drawn_motions,
+    margin_section,
+    motion_section,
+    result_figures,
+)
+from excite_cli.summary.side_by_side import comparable, compare_results, differences
+from excite_cli.summary.weakest import weakest_section
 from tests.report.case import Case
 from tests.report.structure import Structure
 
 SMOKE = Path(__file__).parents[2] / "configs" / "smoke.yaml"
 
 
-@pytest.fixture
-def campaign(case: Case) -> RebuiltResult:
-    problem, result = case
-    return RebuiltResult("smoke", result, problem)
-
-
 def _of(kind: type, blocks: tuple[Block, ...]) -> list[Block]:
     return [block for block in blocks if isinstance(block, kind)]
 
 
-def _table(section: PageSection, title: str) -> TableBlock:
-    (found,) = (b for b in section.blocks if isinstance(b, TableBlock) and title in b.title)
+def _table(section: Section, title: str) -> Table:
+    (found,) = (b for b in section.blocks if isinstance(b, Table) and title in b.title)
     return found
 
 
-def _said(section: PageSection) -> str:
+def _said(section: Section) -> str:
     return Structure(render(Page("t", "s", (), (section,)))).text
 
 
@@ -72,69 +63,69 @@ def test_numbers_as_people_write_them(value: float, text: str) -> None:
     assert in_figures(value) == text
 
 
-def test_condition_numbers_beside_random_ones(campaign: RebuiltResult) -> None:
-    result, section = campaign.result, condition_section(campaign)
+def test_condition_numbers_beside_random_ones(case: Case) -> None:
+    problem, result = case
+    section = condition_section(result, problem)
     reached, random = (
         found[-1].stacked_condition_number for found in (result.motions, result.random)
     )
     assert f"{in_figures(random / reached)} times worse" in section.lead
     assert "20 admissible random motions (30 drawn)" in section.lead
-    row = _table(section, "Motions").rows[0]
-    assert row[1:6] == tuple(
-        in_figures(number)
-        for number in (
-            result.motions[0].condition_number,
-            reached,
-            result.random[0].condition_number,
-            result.random[0].stacked_condition_number,
-            result.random[0].stacked_condition_number / reached,
-        )
+    beside = _table(section, "optimised and random").rows[0]
+    assert beside[1:] == (
+        f"{result.motions[0].condition_number:.1f}",
+        f"{reached:.1f}",
+        f"{result.random[0].condition_number:.1f}",
+        f"{result.random[0].stacked_condition_number:.1f}",
+        f"{result.random[0].stacked_condition_number / reached:.2f}",
     )
-    assert [figure.value for figure in campaign_figures(campaign)][:2] == [
+    assert [figure.value for figure in result_figures(result, problem)][:2] == [
         in_figures(reached),
         in_figures(random),
     ]
-    assert _of(Text, section.blocks) == []
+    assert _of(str, section.blocks) == []
 
 
-def test_without_random_motions_it_says_how_to_get_them(campaign: RebuiltResult) -> None:
-    alone = replace(campaign, result=replace(campaign.result, random=()))
-    section = condition_section(alone)
+def test_without_random_motions_it_says_how_to_get_them(case: Case) -> None:
+    problem, result = case
+    section = condition_section(replace(result, random=()), problem)
     assert "excite compare-random" in _said(section)
     assert "random" not in section.lead
-    assert len(_table(section, "Motions").columns) == 6
+    assert len([block for block in section.blocks if isinstance(block, Table)]) == 1
 
 
-def test_indices_with_gaps_have_their_own_places(campaign: RebuiltResult) -> None:
-    (one, two) = campaign.result.random
-    gaps = replace(campaign.result, random=(replace(one, index=1), replace(two, index=7)))
+def test_indices_with_gaps_have_their_own_places(case: Case) -> None:
+    _, result = case
+    (one, two) = result.random
+    gaps = replace(result, random=(replace(one, index=1), replace(two, index=7)))
     plot = condition_chart(gaps)
     assert plot.x.tolist() == [1.0, 7.0]
     stacked = next(s for s in plot.panels[0].series if s.label == "random, stacked")
     assert np.isfinite(stacked.y).all()
 
 
-def test_a_condition_number_that_is_not_finite(campaign: RebuiltResult) -> None:
-    motion = replace(campaign.result.motions[0], condition_number=float("inf"))
-    result = replace(campaign.result, motions=(motion,), random=())
-    section = condition_section(replace(campaign, result=result))
-    assert _table(section, "Motions").rows[0][1] == "∞"
+def test_a_condition_number_that_is_not_finite(case: Case) -> None:
+    problem, result = case
+    motion = replace(result.motions[0], condition_number=float("inf"))
+    section = condition_section(replace(result, motions=(motion,), random=()), problem)
+    assert _table(section, "Condition numbers").rows[0][1] == "inf"
 
 
-def test_a_card_for_every_joint_and_a_choice_of_motions(campaign: RebuiltResult) -> None:
-    motion = campaign.result.motions[0]
-    two = replace(campaign.result, motions=(motion, replace(motion, index=2)))
-    section = motion_section(replace(campaign, result=two))
-    (choice,) = _of(ChoiceBlock, section.blocks)
-    assert isinstance(choice, ChoiceBlock)
+def test_a_card_for_every_joint_and_a_choice_of_motions(case: Case) -> None:
+    problem, result = case
+    motion = result.motions[0]
+    two = replace(result, motions=(motion, replace(motion, index=2)))
+    section = motion_section(two, problem)
+    (choice,) = _of(Choice, section.blocks)
+    assert isinstance(choice, Choice)
     assert [text for text, _ in choice.options] == ["motion 1", "motion 2"]
     cards = choice.options[0][1][0]
     assert isinstance(cards, Charts)
-    assert [chart.title for chart in cards.charts] == list(campaign.problem.robot.joint_names)
+    assert [chart.title for chart in cards.charts] == list(problem.robot.joint_names)
     peaks = choice.options[0][1][1]
-    assert isinstance(peaks, TableBlock)
-    q, v, _ = campaign.problem.trajectory.basis(np.linspace(0, 6, 400)).states(motion.coefficients)
-    limits = campaign.problem.robot.limits.velocity
+    assert isinstance(peaks, Table)
+    q, v, _ = problem.trajectory.basis(np.linspace(0, 6, 400)).states(motion.coefficients)
+    limits = problem.robot.limits.velocity
     for joint, row in enumerate(peaks.rows):
         assert row[1].startswith(f"{in_figures(float(q[:, joint].min()))} … ")
         share = np.abs(v[:, joint]).max() / limits[joint]
@@ -142,37 +133,40 @@ def test_a_card_for_every_joint_and_a_choice_of_motions(campaign: RebuiltResult)
     assert peaks.rows[4][1].endswith(" m")
 
 
-def test_many_motions_are_not_all_drawn(campaign: RebuiltResult) -> None:
-    motions = tuple(replace(campaign.result.motions[0], index=k) for k in range(1, 51))
+def test_many_motions_are_not_all_drawn(case: Case) -> None:
+    _, result = case
+    motions = tuple(replace(result.motions[0], index=k) for k in range(1, 51))
     assert len(drawn_motions(motions, 30)) == 4
     assert len(drawn_motions(motions, 400)) == 1
     assert drawn_motions(motions[:3], 30) == motions[:3]
 
 
-def test_margins_name_the_worst_and_the_verdict(campaign: RebuiltResult) -> None:
-    motion = campaign.result.motions[0]
+def test_margins_name_the_worst_and_the_verdict(case: Case) -> None:
+    problem, result = case
+    motion = result.motions[0]
     assert all(motion.certified.values())
-    section = margin_section(campaign)
+    section = margin_section(result, problem)
     assert "proved to hold at every instant" in _said(section)
     rows = {row[0]: row for row in _table(section, "Worst margins").rows}
     worst = motion.margins["self_collision"]
     assert rows["self_collision"][1:] == (
-        f"{in_figures(worst.margin)} m",
-        f"{100 * worst.share:.2g} %",
+        f"{worst.margin:.4f}",
+        "m",
         worst.label,
         "1",
         f"{worst.time:.3f}",
+        f"{100 * worst.share:.2g} %",
         "proved",
     )
-    (choice,) = _of(ChoiceBlock, section.blocks)
-    assert isinstance(choice, ChoiceBlock)
+    (choice,) = _of(Choice, section.blocks)
+    assert isinstance(choice, Choice)
     charts = choice.options[0][1][0]
     assert isinstance(charts, Charts)
-    assert len(charts.charts) == len(campaign.problem.constraints)
+    assert len(charts.charts) == len(problem.constraints)
     said = charts.charts[-1].alternative
     assert worst.label in said
     assert f"{worst.time:.3f} s" in said
-    (figure,) = margin_figures(campaign)
+    figure = result_figures(result, problem)[-1]
     assert figure.value == "all proved"
 
 
@@ -197,33 +191,35 @@ def test_margins_name_the_worst_and_the_verdict(campaign: RebuiltResult) -> None
     ],
 )
 def test_what_is_not_proved_is_not_said_to_be(
-    campaign: RebuiltResult,
+    case: Case,
     certified: dict[str, bool],
     violations: int,
     words: str,
     kind: str,
     value: str,
 ) -> None:
-    motion = campaign.result.motions[0]
+    problem, result = case
+    motion = result.motions[0]
     worst = replace(motion.margins["self_collision"], violations=violations)
     margins = {**motion.margins, "self_collision": worst}
     changed = replace(motion, certified=certified, margins=margins)
-    other = replace(campaign, result=replace(campaign.result, motions=(changed,)))
-    verdict, *_ = _of(Text, margin_section(other).blocks)
+    other = replace(result, motions=(changed,))
+    verdict, *_ = _of(Text, margin_section(other, problem).blocks)
     assert isinstance(verdict, Text)
     assert words in verdict.text
     assert verdict.kind == kind
-    (figure,) = margin_figures(other)
+    figure = result_figures(other, problem)[-1]
     assert value in figure.value
 
 
-def test_the_weakest_direction_is_that_of_the_stack(campaign: RebuiltResult) -> None:
-    rank = campaign.problem.base.rank
+def test_the_weakest_direction_is_that_of_the_stack(case: Case) -> None:
+    problem, result = case
+    rank = problem.base.rank
     sizes = np.full(rank, 10.0)
     sizes[3] = 0.5
     stack = Stack(np.diag(sizes), 300)
-    section = weakest_section(replace(campaign, result=replace(campaign.result, stack=stack)))
-    name = campaign.problem.base.names[campaign.result.base_selection[3]]
+    section = weakest_section(replace(result, stack=stack), problem)
+    name = problem.base.names[result.base_selection[3]]
     assert f"mostly {name}, which makes up 100 % of it" in section.lead
     assert "0.500, 20.0 times less" in section.lead
     assert _table(section, "weakest direction").rows[0][:3] == (name, "+1.00", "100 %")
@@ -232,42 +228,41 @@ def test_the_weakest_direction_is_that_of_the_stack(campaign: RebuiltResult) -> 
     assert all(row[3] == "0.100" for key, row in rows.items() if key != name)
 
 
-def test_a_singular_stack_is_told(campaign: RebuiltResult) -> None:
-    stack = Stack(np.diag([1.0, *np.zeros(campaign.problem.base.rank - 1)]), 1)
-    section = weakest_section(replace(campaign, result=replace(campaign.result, stack=stack)))
+def test_a_singular_stack_is_told(case: Case) -> None:
+    problem, result = case
+    stack = Stack(np.diag([1.0, *np.zeros(problem.base.rank - 1)]), 1)
+    section = weakest_section(replace(result, stack=stack), problem)
     assert "does not show at all" in section.lead
 
 
-def test_configs_that_differ_are_told_key_by_key(campaign: RebuiltResult) -> None:
-    config = campaign.result.config
+def test_configs_that_differ_are_told_key_by_key(case: Case) -> None:
+    _, result = case
+    config = result.config
     spec = parse_spec(config)
     torque = {"constraints.torque.scale": 0.5, "seed": 7}
     changed = parse_spec(config, overrides=[f"{key}={value}" for key, value in torque.items()])
-    table = differences(("a", "b"), (spec_as_yaml(spec), spec_as_yaml(changed)))
-    assert isinstance(table, TableBlock)
+    table = differences({"a": spec_as_yaml(spec), "b": spec_as_yaml(changed)})
+    assert isinstance(table, Table)
     assert set(table.rows) == {("constraints.torque.scale", "0.9", "0.5"), ("seed", "1", "7")}
-    same = differences(("a", "b"), (config, config))
-    assert isinstance(same, Text)
+    assert isinstance(differences({"a": config, "b": config}), str)
 
 
-def test_results_side_by_side(campaign: RebuiltResult) -> None:
-    slow = replace(campaign.result.motions[0], stacked_condition_number=99.0)
-    other = replace(
-        campaign, name="other", number=2, alone=False,
-        result=replace(campaign.result, motions=(slow,), random=()),
-    )  # fmt: skip
-    section = compare_results([campaign, other])
+def test_results_side_by_side(case: Case) -> None:
+    _, result = case
+    slow = replace(result.motions[0], stacked_condition_number=99.0)
+    other = replace(result, motions=(slow,), random=())
+    section = compare_results({"smoke": result, "other": other})
     assert section.lead.endswith("Lowest: smoke.")
     assert [row[0] for row in _table(section, "Condition numbers").rows] == ["smoke", "other"]
     assert len(_of(Charts, section.blocks)) == 1
 
 
-def test_other_weights_are_not_compared(campaign: RebuiltResult) -> None:
-    other = replace(campaign.result, row_weights=2 * campaign.result.row_weights)
-    both = [campaign, replace(campaign, result=other)]
-    assert comparable([campaign, campaign])
-    assert not comparable(both)
-    section = compare_results(both)
+def test_other_weights_are_not_compared(case: Case) -> None:
+    _, result = case
+    other = replace(result, row_weights=2 * result.row_weights)
+    assert comparable([result, result])
+    assert not comparable([result, other])
+    section = compare_results({"one": result, "other": other})
     assert "do not compare" in _said(section)
     assert "Lowest" not in section.lead
     assert _of(Charts, section.blocks) == []
@@ -287,41 +282,41 @@ def test_several_files_have_sections_of_their_own(case: Case) -> None:
 
 
 def test_the_spectrum_of_random_motions_stands_on_the_prior(case: Case) -> None:
-    from excite_cli.report.spectrum_chart import random_stack
-
     problem, result = case
     prior = Stack(1e3 * np.eye(problem.columns), 10)
     sigma = singular_values(random_stack(replace(result, prior_stack=prior), problem))
     assert sigma[-1] >= 1e3
 
 
-def test_weights_and_scales_are_said(campaign: RebuiltResult) -> None:
-    assert "Of the regressor" not in condition_section(campaign).lead
-    weighting = replace(campaign.problem.weighting, row_name="effort", column_name="unit_norm")
-    problem = replace(campaign.problem, weighting=weighting)
-    section = condition_section(replace(campaign, problem=problem))
+def test_weights_and_scales_are_said(case: Case) -> None:
+    problem, result = case
+    assert "Of the regressor" not in condition_section(result, problem).lead
+    weighting = replace(problem.weighting, row_name="effort", column_name="unit_norm")
+    section = condition_section(result, replace(problem, weighting=weighting))
     words = "Of the regressor with rows weighted (effort), columns scaled (unit norm)."
     assert section.lead.endswith(words)
 
 
-def test_without_limits_cards_speak_of_peaks(campaign: RebuiltResult) -> None:
-    free = replace(campaign, problem=replace(campaign.problem, constraints=()))
-    (choice,) = _of(ChoiceBlock, motion_section(free).blocks)
-    assert isinstance(choice, ChoiceBlock)
+def test_without_limits_cards_speak_of_peaks(case: Case) -> None:
+    problem, result = case
+    free = replace(problem, constraints=())
+    (choice,) = _of(Choice, motion_section(result, free).blocks)
+    assert isinstance(choice, Choice)
     cards = choice.options[0][1][0]
     assert isinstance(cards, Charts)
     assert isinstance(cards.charts[0], Plot)
     assert cards.charts[0].panels[1].axis == "share of peak [–]"
     assert "limits none to none" in cards.charts[0].alternative
-    assert "nothing to keep away from" in _said(margin_section(free))
-    assert margin_figures(free) == ()
+    assert "nothing to keep away from" in _said(margin_section(result, free))
+    assert [figure.name for figure in result_figures(result, free)][-1] == "motions"
 
 
-def test_the_margins_say_of_which_pairs_they_speak(campaign: RebuiltResult) -> None:
-    assert "all 7 relevant" in _said(margin_section(campaign))
+def test_the_margins_say_of_which_pairs_they_speak(case: Case) -> None:
+    problem, result = case
+    assert "all 7 relevant" in _said(margin_section(result, problem))
     config = "constraints.self_collision.ignore=[[base, wrist]]"
     problem = load_problem(SMOKE, [config])
-    section = margin_section(replace(campaign, problem=problem))
+    section = margin_section(result, problem)
     said = _said(section)
     assert "link pairs checked." in said
     assert "NOT GUARDED" not in said

@@ -1,16 +1,14 @@
-"""Errors of the torque per joint, as dumbbells and as a table."""
+"""Errors per joint as dumbbells: two errors of each joint on one line, and what noise leaves."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from excite_cli.identification.errors_of_torque import Errors
-from excite_cli.identification.fit_words import above_the_floor
-from excite_cli.report.chart import Chart
-from excite_cli.report.page import Block, Charts, TableBlock, Text
-from excite_cli.report.rows_chart import Axis, Bar, Mark, Row, rows_chart
+from excite_cli.report.rows_chart import Axis, Bar, Mark, Row, RowsChart, rows_chart
 
-# Errors per joint as dumbbells: two errors of each joint on one line, and what noise leaves.
+DECLARED_AND_FOUND = ("declared", "with effects")
+NOTHING_MOVES = "No joint moves in the held-out data: there is no error while moving."
 
 
 @dataclass(frozen=True)
@@ -27,7 +25,7 @@ class Dumbbells:
     means: tuple[float, float] | None = None
 
 
-def dumbbell_chart(title: str, axis: str, values: Dumbbells, alternative: str) -> Chart:
+def dumbbell_chart(title: str, axis: str, values: Dumbbells, alternative: str) -> RowsChart:
     """The chart, on a logarithmic axis; joints without a value are left out."""
     rows = []
     for joint, second in values.second.items():
@@ -51,34 +49,24 @@ def _pair(name: str, first: float, second: float, words: tuple[str, str], floor:
     return Row(name, tuple(marks), (Bar(min(first, second), max(first, second), "muted"),))
 
 
-def error_blocks(
+def error_charts(
     words: tuple[str, str],
-    first: Errors,
-    second: Errors,
+    errors: tuple[Errors, Errors],
     units: Mapping[str, str],
     floor: Mapping[str, float] | None,
-    note: str,
-) -> tuple[Block, ...]:
+) -> tuple[RowsChart, ...]:
     """Two errors of every joint beside each other; `words` name them, `units` those of torque.
 
     `floor` is the RMS that repeated periods differ by.
     """
+    first, second = errors
     moving = any(map(math.isfinite, second.relative_moving.values()))
     charts = [_relative(words, first, second)] if moving else []
-    charts += [
-        _rms(words, first, second, unit, units, floor) for unit in dict.fromkeys(units.values())
-    ]
-    blocks: list[Block] = [Charts(tuple(charts))]
-    if not moving:
-        blocks.append(Text("No joint moves in the held-out data: there is no error while moving."))
-    above = above_the_floor(second, floor)
-    if above:
-        blocks.append(Text(above))
-    blocks.append(_table(words, first, second, units, floor, note))
-    return tuple(blocks)
+    each_unit = dict.fromkeys(units.values())
+    return (*charts, *(_rms(words, first, second, unit, units, floor) for unit in each_unit))
 
 
-def _relative(words: tuple[str, str], first: Errors, second: Errors) -> Chart:
+def _relative(words: tuple[str, str], first: Errors, second: Errors) -> RowsChart:
     values = Dumbbells(
         words,
         _percent(first.relative_moving),
@@ -107,8 +95,8 @@ def _rms(
     unit: str,
     units: Mapping[str, str],
     floor: Mapping[str, float] | None,
-) -> Chart:
-    joints = [joint for joint in second.rms if units.get(joint, "N·m") == unit]
+) -> RowsChart:
+    joints = [joint for joint in second.rms if units[joint] == unit]
     values = Dumbbells(
         words,
         {joint: first.rms[joint] for joint in joints},
@@ -117,64 +105,10 @@ def _rms(
     )
     known = [j for j in joints if math.isfinite(second.rms[j])]
     told = ", ".join(f"{j} {first.rms[j]:.3g} → {second.rms[j]:.3g}" for j in known)
-    what = "torque" if unit == "N·m" else "force"
+    what = "force" if unit == "N" else "torque"
     return dumbbell_chart(
         f"RMS error of the {what}, all samples",
         f"RMS error [{unit}]",
         values,
         f"RMS errors in {unit}, {words[0]} → {words[1]}: {told}.",
     )
-
-
-def _table(
-    words: tuple[str, str],
-    first: Errors,
-    second: Errors,
-    units: Mapping[str, str],
-    floor: Mapping[str, float] | None,
-    note: str,
-) -> TableBlock:
-    one, two = words
-    columns = (
-        "joint", f"moving, {one}", f"moving, {two}", f"all, {one}", f"all, {two}",
-        f"RMS, {one}", f"RMS, {two}", *(["noise floor"] if floor else []), "raw RMS", "unit",
-    )  # fmt: skip
-    rows: list[tuple[str, ...]] = []
-    for joint in second.relative:
-        level = [f"{floor[joint]:.4g}" if joint in floor else "–"] if floor else []
-        rows.append(
-            (
-                joint,
-                *(_share(e.relative_moving[joint]) for e in (first, second)),
-                *(_share(e.relative[joint]) for e in (first, second)),
-                *(_figure(e.rms[joint]) for e in (first, second)),
-                *level,
-                _figure(second.rms_raw[joint]),
-                units.get(joint, "N·m"),
-            )
-        )
-    means = [_share(x) for x in (first.mean_relative_moving, second.mean_relative_moving,
-                                 first.mean_relative, second.mean_relative)]  # fmt: skip
-    rows.append(("mean", *means, *[""] * (len(columns) - 5)))
-    return TableBlock(
-        columns,
-        tuple(rows),
-        title="Errors in figures",
-        right=frozenset(range(1, len(columns) - 1)),
-        note=note,
-        folded=True,
-        strong=frozenset({len(rows) - 1}),
-    )
-
-
-def _share(x: float) -> str:
-    return f"{x:.2%}" if math.isfinite(x) else "–"
-
-
-def _figure(x: float) -> str:
-    return f"{x:.4g}" if math.isfinite(x) else "–"
-
-
-def by_joint(joints: Sequence[str], units: Sequence[str]) -> dict[str, str]:
-    """Units of the torque by joint; N·m where a file of an earlier version has none."""
-    return dict(zip(joints, units or ["N·m"] * len(joints), strict=True))

@@ -7,9 +7,9 @@ import pytest
 
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.effects.catalogue import catalogue
-from excite_cli.report.effect_section import effect_section
-from excite_cli.report.page import Charts
 from excite_cli.report.plot import Plot
+from excite_cli.shown.answer import Charts, Detail
+from excite_cli.summary.effect_evidence import evidence_section
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis, make_traces
 
 
@@ -27,10 +27,8 @@ def charts(plain: Diagnosis, kinds: Sequence[str], quantity: str = "speed") -> l
     (named,), (trace,) = plain.effects, plain.traces.effects
     effects = tuple(replace(named, effect=replace(named.effect, kind=kind)) for kind in kinds)
     drawn = tuple(replace(trace, kind=kind, quantity=quantity) for kind in kinds)
-    section = effect_section(
-        replace(plain, effects=effects, traces=replace(plain.traces, effects=drawn))
-    )
-    assert section is not None
+    found = replace(plain, effects=effects, traces=replace(plain.traces, effects=drawn))
+    section = evidence_section(found, Detail.PAGE)
     cards = [c for block in section.blocks if isinstance(block, Charts) for c in block.charts]
     return [card for card in cards if isinstance(card, Plot)]
 

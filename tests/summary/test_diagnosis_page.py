@@ -1,4 +1,4 @@
-"""What a page says of a diagnosis: verdict, errors, evidence, the rest, and of older files."""
+"""What a page says of a diagnosis: verdict, errors, evidence, the rest, and what is left."""
 
 import re
 from collections.abc import Iterator
@@ -16,38 +16,39 @@ from excite_cli.diagnosis.records import (
     JointAlias,
     NamedEffect,
 )
-from excite_cli.diagnosis.verdict import HeldOutVerdict
-from excite_cli.diagnosis.words import approximation_in_words, covariate_in_words, title_of
-from excite_cli.effects.asymmetric_friction import AsymmetricFriction
+from excite_cli.diagnosis.words import approximation_in_words, covariate_in_words
 from excite_cli.effects.base import Value
 from excite_cli.measurement.dataset import Finding
-from excite_cli.report.assembly import Source, page_of
 from excite_cli.report.chart import Chart
-from excite_cli.report.dependence_section import dependence_section
-from excite_cli.report.diagnosis_found_section import found_section
-from excite_cli.report.diagnosis_sections import diagnosis_figures, diagnosis_sections
 from excite_cli.report.effect_chart import Cloud, law_line
-from excite_cli.report.effect_section import effect_section
-from excite_cli.report.page import (
+from excite_cli.report.page import render
+from excite_cli.report.plot import Plot
+from excite_cli.report.residual_chart import residuals_in_time
+from excite_cli.shown.answer import (
     Block,
     Charts,
-    ChoiceBlock,
+    Choice,
+    Detail,
     Fold,
     Page,
-    PageSection,
-    TableBlock,
+    Section,
+    Table,
     Text,
-    render,
+    parts_of,
 )
-from excite_cli.report.plot import Plot
-from excite_cli.report.residual_section import residuals_in_time
+from excite_cli.summary.assembly import Source, page_of
+from excite_cli.summary.diagnosis import (
+    diagnosis_figures,
+    diagnosis_parts,
+    diagnosis_sections,
+)
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis, make_traces
 from tests.report.structure import Structure
 
 
 @pytest.fixture(scope="module")
 def plain() -> Diagnosis:
-    """As files of earlier versions hold it."""
+    """Without torque over time."""
     return make_diagnosis()
 
 
@@ -62,12 +63,12 @@ def diagnosis(plain: Diagnosis) -> Diagnosis:
 
 
 @pytest.fixture(scope="module")
-def every(diagnosis: Diagnosis) -> tuple[PageSection, ...]:
-    return diagnosis_sections(diagnosis)
+def every(diagnosis: Diagnosis) -> tuple[Section, ...]:
+    return tuple(diagnosis_sections(diagnosis))
 
 
 @pytest.fixture(scope="module")
-def sections(every: tuple[PageSection, ...]) -> dict[str, PageSection]:
+def sections(every: tuple[Section, ...]) -> dict[str, Section]:
     return {each.anchor: each for each in every}
 
 
@@ -79,12 +80,17 @@ def blocks_of(blocks: tuple[Block, ...]) -> Iterator[Block]:
             yield from block.charts
         elif isinstance(block, Fold):
             yield from blocks_of(block.blocks)
-        elif isinstance(block, ChoiceBlock):
+        elif isinstance(block, Choice):
             for _, inner in block.options:
                 yield from blocks_of(inner)
 
 
-def charts_of(section: PageSection) -> list[Chart | Plot]:
+def section_of(found: Diagnosis, topic: str) -> Section:
+    """One section of its page."""
+    return {each.anchor: each for each in diagnosis_sections(found)}[f"diagnosis-{topic}"]
+
+
+def charts_of(section: Section) -> list[Chart | Plot]:
     return [block for block in blocks_of(section.blocks) if isinstance(block, Chart | Plot)]
 
 
@@ -115,7 +121,7 @@ def small(diagnosis: Diagnosis, part: float) -> Diagnosis:
 
 
 def test_all_parts_are_there_and_the_page_is_sound(
-    diagnosis: Diagnosis, every: tuple[PageSection, ...]
+    diagnosis: Diagnosis, every: tuple[Section, ...]
 ) -> None:
     page = Page("d", "", diagnosis_figures(diagnosis), every)
     structure = Structure(render(page))
@@ -124,15 +130,14 @@ def test_all_parts_are_there_and_the_page_is_sound(
         "diagnosis-unexplained", "diagnosis-next", "diagnosis-candidates", "diagnosis-data",
     ]  # fmt: skip
     for words in (
-        "viscous friction",
-        "nonlinear viscous friction",
+        "viscous_friction on elbow is indistinguishable from: nonlinear_viscous_friction on elbow",
         "time stamps jitter by 3 %",
     ):
         assert words in structure.text
 
 
 def test_every_chart_says_its_finding_in_figures_and_labels_its_axes(
-    sections: dict[str, PageSection],
+    sections: dict[str, Section],
 ) -> None:
     charts = [chart for section in sections.values() for chart in charts_of(section)]
     assert len(charts) > 5
@@ -142,11 +147,11 @@ def test_every_chart_says_its_finding_in_figures_and_labels_its_axes(
             assert re.search(r"\[[^\]]+\]", drawn(chart)), chart.title
 
 
-def test_evidence_shows_the_law_and_its_figures(sections: dict[str, PageSection]) -> None:
+def test_evidence_shows_the_law_and_its_figures(sections: dict[str, Section]) -> None:
     (chart,) = charts_of(sections["diagnosis-evidence"])
-    assert chart.title == "Viscous friction: elbow"
+    assert chart.title == "viscous_friction: elbow"
     assert "2.00 ± 0.10 N·m·s/rad" in chart.caption
-    assert "cannot distinguish it from: nonlinear viscous friction on elbow" in chart.caption
+    assert "is indistinguishable from: nonlinear_viscous_friction on elbow" in chart.caption
     assert "99.8%" in chart.alternative or "99.9%" in chart.alternative
     assert drawn(chart).startswith("speed [rad/s]")
 
@@ -154,41 +159,26 @@ def test_evidence_shows_the_law_and_its_figures(sections: dict[str, PageSection]
 @pytest.mark.parametrize(
     ("beside", "told"),
     [
-        ((), "cannot distinguish it from: armature on elbow."),
-        (("spring",), "cannot distinguish it with spring at the joint on elbow from: "),
+        ((), "viscous_friction on elbow is indistinguishable from: armature on elbow."),
+        (("spring",), "viscous_friction on elbow + spring on elbow are indistinguishable from: "),
     ],
 )
 def test_evidence_tells_of_pairs(diagnosis: Diagnosis, beside: tuple[str, ...], told: str) -> None:
+    """In the words of the table."""
     own, other = diagnosis.effects[0].effect, EffectRecord("armature", ("elbow",))
     named = (own, *(EffectRecord(kind, ("elbow",)) for kind in beside))
     found = replace(diagnosis, joint_aliases=(JointAlias(named, (other,)),))
     elsewhere = replace(found, joint_aliases=(JointAlias((other,), (own,)),))
-    captions = []
-    for each in (found, elsewhere, diagnosis):
-        section = effect_section(each)
-        assert section is not None
-        captions.append(charts_of(section)[0].caption)
-    assert told.replace("armature", title_of("armature")) in captions[0]
+    captions = [
+        charts_of(section_of(each, "evidence"))[0].caption for each in (found, elsewhere, diagnosis)
+    ]
+    assert told in captions[0]
     assert captions[1] == captions[2]
 
 
-def test_evidence_tells_of_another_name_of_the_same_torque(
-    diagnosis: Diagnosis, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    own = diagnosis.effects[0].effect
-    offset, other = (EffectRecord(k, ("elbow",)) for k in ("torque_offset", "asymmetric_friction"))
-    monkeypatch.setattr(AsymmetricFriction, "same_as", (own.kind, offset.kind))
-    found = replace(diagnosis, joint_aliases=(JointAlias((own, offset), (other,)),))
-    section = effect_section(found)
-    assert section is not None
-    told = charts_of(section)[0].caption
-    assert f"It with {title_of('torque_offset')} on elbow is the same torque as" in told
-    assert "no motion distinguishes them" in told
-
-
-def test_residuals_tell_held_out_from_training(sections: dict[str, PageSection]) -> None:
+def test_residuals_tell_held_out_from_training(sections: dict[str, Section]) -> None:
     (choice,) = sections["diagnosis-time"].blocks
-    assert isinstance(choice, ChoiceBlock)
+    assert isinstance(choice, Choice)
     labels = [label for label, _ in choice.options]
     assert labels == ["run_3 (held out: took no part in the fit)", "run_1"]
     elbow = next(c for c in charts_of(sections["diagnosis-time"]) if c.title == "elbow")
@@ -213,15 +203,19 @@ def test_held_out_blocks_of_a_run_are_shaded(diagnosis: Diagnosis) -> None:
     assert chart.panels[0].axis == "force [N]"
 
 
-def test_what_depends_is_told_drawn_and_mapped(sections: dict[str, PageSection]) -> None:
+def test_what_depends_is_told_drawn_and_mapped(sections: dict[str, Section]) -> None:
     section = sections["diagnosis-unexplained"]
     told = [b.text for b in section.blocks if isinstance(b, Text)]
-    assert any("60% of its variance is predictable, best from history of angle" in x for x in told)
-    picture, table = charts_of(section)
+    assert any("60% of its variance is predictable, best from history of q[" in x for x in told)
+    (picture,) = charts_of(section)
     assert "mean forwards" in drawn(picture)
-    assert ">30<" in drawn(table).replace("\n", "")
-    assert "own angle and direction" in drawn(table)
-    assert ">time<" not in drawn(table)  # explains nothing
+    (table,) = (block for block in section.blocks if isinstance(block, Table))
+    names = [row[0] for row in table.rows]
+    assert "own angle and direction" in names
+    assert "time" not in names  # explains nothing
+    assert "30" in table.rows[0]  # the most first
+    page = render(Page("d", "", (), (section,)))
+    assert "var(--blue) 24%, transparent)" in page  # 60 % of 0.3, and a little
 
 
 def test_without_dependences_there_is_no_map(diagnosis: Diagnosis) -> None:
@@ -234,9 +228,9 @@ def test_without_dependences_there_is_no_map(diagnosis: Diagnosis) -> None:
         excess_residuals=(),
         traces=replace(diagnosis.traces, dependence=dependence),
     )
-    section = dependence_section(calm)
+    section = section_of(calm, "unexplained")
     assert charts_of(section) == []
-    texts = " ".join(block.text for block in section.blocks if isinstance(block, Text))
+    texts = str(section.blocks)
     assert "behaves like noise" in texts
     assert "No smooth function" in texts
 
@@ -245,41 +239,31 @@ def test_without_dependences_there_is_no_map(diagnosis: Diagnosis) -> None:
 def test_effects_that_carry_less_than_a_hundredth_of_the_fall_are_folded(
     diagnosis: Diagnosis, part: float, folded: bool
 ) -> None:
-    found = found_section(small(diagnosis, part))
-    tables = [block for block in found.blocks if isinstance(block, TableBlock)]
-    spring = next(t for t in tables if any(row[0] == "spring at the joint" for row in t.rows))
+    found = section_of(small(diagnosis, part), "found")
+    tables = [block for block in found.blocks if isinstance(block, Table)]
+    spring = next(t for t in tables if any(row[0] == "spring" for row in t.rows))
     assert spring.folded == folded
 
 
-def test_verdicts_on_held_out_data_stand_in_the_table_and_on_the_card(
-    diagnosis: Diagnosis, sections: dict[str, PageSection]
-) -> None:
-    table = next(b for b in sections["diagnosis-found"].blocks if isinstance(b, TableBlock))
-    assert table.rows[0][table.columns.index("held-out, without it")] == "confirmed, +6.00 pp"
+def test_verdicts_on_held_out_data_stand_on_the_card(sections: dict[str, Section]) -> None:
     (chart,) = charts_of(sections["diagnosis-evidence"])
     assert "Held-out, without it: confirmed, +6.00 pp." in chart.caption
-    assert found_section(diagnosis).lead.count("which took no part, goes from") == 1
 
 
-def test_what_was_weighed_and_what_would_settle_the_absorbed_is_told(diagnosis: Diagnosis) -> None:
-    """The one or the other: what is weighed settles nothing more."""
+def test_the_page_has_every_table_and_sentence_of_the_terminal(diagnosis: Diagnosis) -> None:
+    """All that a verbose answer says, but how the data were processed, which is a table there."""
     (named, *_) = diagnosis.effects
     absorbed = (ConfoundedCandidate("wrench_gain", ("elbow",), ("m[elbow]",), 0.0),)
-    free = found_section(replace(diagnosis, absorbed=absorbed))
-    weighed = replace(named, verdict=HeldOutVerdict.WEIGHED)
-    told = found_section(replace(diagnosis, effects=(weighed,), absorbed=absorbed))
-    notes = [
-        [
-            block.note
-            for block in each.blocks
-            if isinstance(block, TableBlock)
-            if "Not identifiable" in block.title
-        ]
-        for each in (free, told)
-    ]
-    assert ["identification.total_mass" in note for (note,) in notes] == [True, False]
-    texts = [block.text for block in told.blocks if isinstance(block, Text)]
-    assert any("held-out data cannot test this effect" in text for text in texts)
+    found = replace(diagnosis, effects=(replace(named, aliases=()), named), absorbed=absorbed)
+    processing = {"samples": 10, "rate": 20.0, "candidates": 3, "inflation": 1.0}
+    told = diagnosis_parts(replace(found, processing=processing), Detail.VERBOSE)
+    (answer, processed, *parts) = told
+    page = parts_of(diagnosis_sections(found))
+    assert "10 training samples" in str(processed)
+    assert any(isinstance(part, Table) for part in parts)
+    for part in parts:
+        assert part in page, part
+    assert page_of([Source("d", "d.h5", found)], silent).answers[0].text == answer
 
 
 def test_warnings_are_counted_on_top(diagnosis: Diagnosis) -> None:
@@ -298,23 +282,23 @@ def test_every_run_is_listed_with_its_use_and_what_is_there_alone(diagnosis: Dia
     (runs,) = (
         block
         for block in diagnosis_sections(found)[-1].blocks
-        if isinstance(block, TableBlock) and block.title == "Runs"
+        if isinstance(block, Table) and block.title == "Runs"
     )
     assert runs.rows == (
         ("a", "training", "–"),
-        ("b", "training", "viscous friction of elbow"),
+        ("b", "training", "viscous_friction on elbow"),
         ("c", "held-out", "–"),
     )
     parts = {**diagnosis.processing, "runs": ["a", "b/1"]}
     (runs,) = (
         block
         for block in diagnosis_sections(replace(found, processing=parts))[-1].blocks
-        if isinstance(block, TableBlock) and block.title == "Runs"
+        if isinstance(block, Table) and block.title == "Runs"
     )
-    assert [row[2] for row in runs.rows] == ["–", "viscous friction of elbow", "–"]
+    assert [row[2] for row in runs.rows] == ["–", "viscous_friction on elbow", "–"]
     single = replace(found, processing={**processing, "runs": ["a"]})
     blocks = diagnosis_sections(single)[-1].blocks
-    assert not any(isinstance(each, TableBlock) and each.title == "Runs" for each in blocks)
+    assert not any(isinstance(each, Table) and each.title == "Runs" for each in blocks)
 
 
 def test_a_held_out_error_that_did_not_fall_is_told_first(diagnosis: Diagnosis) -> None:
@@ -341,23 +325,20 @@ def test_nothing_found(diagnosis: Diagnosis) -> None:
     ):
         (answer,) = page_of([Source("d", "d.h5", each)], silent).answers
         assert answer.text.startswith(begins)
-    assert effect_section(nothing) is None
+    assert "diagnosis-evidence" not in {each.anchor for each in diagnosis_sections(nothing)}
 
 
-def test_files_of_earlier_versions_get_sentences_and_names_are_escaped(plain: Diagnosis) -> None:
+def test_names_are_escaped_and_sections_without_samples_left_out(plain: Diagnosis) -> None:
     odd = replace(plain, held_out_run="<b>run</b>")
     sections = {each.anchor: each for each in diagnosis_sections(odd)}
-    for anchor in ("diagnosis-time", "diagnosis-evidence"):
-        (text,) = sections[anchor].blocks
-        assert isinstance(text, Text)
-        assert "earlier version" in text.text
+    assert not {"diagnosis-time", "diagnosis-evidence"} & set(sections)
     assert "<b>" not in render(Page("old", "", diagnosis_figures(odd), tuple(sections.values())))
 
 
-def test_joints_that_never_move_are_told_not_drawn(sections: dict[str, PageSection]) -> None:
+def test_joints_that_never_move_are_told_not_drawn(sections: dict[str, Section]) -> None:
     section = sections["diagnosis-errors"]
     assert [chart.title for chart in charts_of(section)] == ["RMS error of the torque, all samples"]
-    assert any("No joint moves" in b.text for b in section.blocks if isinstance(b, Text))
+    assert any("No joint moves" in block for block in section.blocks if isinstance(block, str))
 
 
 @pytest.mark.parametrize(
@@ -374,8 +355,7 @@ def test_joints_that_never_move_are_told_not_drawn(sections: dict[str, PageSecti
 def test_quantities_in_words(symbol: str, words: str) -> None:
     covariate = Covariate.of_code(symbol)
     assert covariate_in_words(covariate) == words
-    found = Approximation((covariate,))
-    assert approximation_in_words(found, covariate_in_words) == f"a function of {words}"
+    assert approximation_in_words(Approximation((covariate,))) == f"a function of {symbol}"
 
 
 def test_a_law_that_jumps_is_drawn_as_a_step_and_a_line_is_not() -> None:

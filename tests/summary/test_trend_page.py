@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from excite_cli.report.page import Charts, render
+from excite_cli.report.page import render
 from excite_cli.report.plot import Plot
-from excite_cli.report.trend_page import trend_page
 from excite_cli.scoring.changes import Known, Snapshot, changes_of
+from excite_cli.shown.answer import Charts
+from excite_cli.summary.changes import trend_page
 
 _MONTH = 30 * 86_400.0
 

@@ -1,17 +1,59 @@
-"""The singular values of the stacked regressor, beside those of random motions."""
+"""Condition numbers by motion, and singular values of their stack, beside those of random ones."""
+
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from excite_cli.criteria.base import condition_number, singular_values
+from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.random_baseline import RandomMotion
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.stack import Stack
-from excite_cli.report.campaign import in_figures
-from excite_cli.report.chart import Colour
+from excite_cli.report.chart import Colour, in_figures
 from excite_cli.report.plot import Curve, Panel, Plot
 from excite_cli.robot.model import Array
 
 _HEIGHT = 200  # px
+
+
+def condition_chart(result: Result) -> Plot:
+    """Own and stacked condition number of every motion on a logarithmic axis."""
+    parts: list[tuple[str, Colour, Sequence[Motion] | Sequence[RandomMotion]]] = [
+        ("optimised", "blue", result.motions)
+    ]
+    if result.random:
+        parts.append(("random", "vermilion", result.random))
+    indices = sorted({motion.index for _, _, motions in parts for motion in motions})
+    at = {index: k for k, index in enumerate(indices)}
+    series = []
+    for word, colour, motions in parts:
+        alone, stacked = np.full((2, len(at)), np.nan)
+        for motion in motions:
+            alone[at[motion.index]] = motion.condition_number
+            stacked[at[motion.index]] = motion.stacked_condition_number
+        alone, stacked = (np.where(np.isfinite(each), each, np.nan) for each in (alone, stacked))
+        series.append(Curve(f"{word}, alone", alone, colour, "rings"))
+        series.append(Curve(f"{word}, stacked", stacked, colour, "joined"))
+    said = "; ".join(
+        f"{word}: stacked {_listed(m.stacked_condition_number for m in motions)}, alone "
+        f"{_listed(m.condition_number for m in motions)}"
+        for word, _, motions in parts
+    )
+    return Plot(
+        "Condition number after each motion",
+        f"Condition numbers by motion, {said}.",
+        "motion [–]",
+        np.array(indices, dtype=float),
+        (Panel("condition number [–]", tuple(series), height=_HEIGHT, logarithmic=True),),
+        caption="Filled: with all motions before stacked. Open: the motion alone.",
+        span=(indices[0] - 0.5, indices[-1] + 0.5),
+        counted=True,
+    )
+
+
+def _listed(numbers: Iterable[float]) -> str:
+    return ", ".join(in_figures(number) for number in numbers)
 
 
 def spectrum_chart(result: Result, problem: Problem) -> Plot:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from excite_cli.campaign.records import Campaign, CampaignOptions
 from excite_cli.report.page import render
-from excite_cli.report.rounds_page import rounds_page
+from excite_cli.summary.campaign import rounds_page
 from tests.campaign.test_records import WHOLE
 
 

@@ -13,10 +13,11 @@ import numpy as np
 from excite_cli.dynamics.regressor import standard_parameter_unit, standard_parameters
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
-from excite_cli.report.campaign import RebuiltResult, in_figures
-from excite_cli.report.page import Block, PageSection, TableBlock, Text
-from excite_cli.report.spectrum_chart import row_unit
+from excite_cli.identification.fit_words import relative_in_words
+from excite_cli.report.chart import in_figures
+from excite_cli.report.condition_chart import row_unit
 from excite_cli.robot.model import Array
+from excite_cli.shown.answer import Block, Section, Table
 
 _SHOWN = 6
 _SINGULAR = 1e-14
@@ -33,23 +34,19 @@ class _Columns:
     expected: Array
 
 
-def weakest_section(campaign: RebuiltResult) -> PageSection:
+def weakest_section(result: Result, problem: Problem) -> Section:
     """The weakest direction in words, its composition, and how well each parameter will show."""
-    result, problem = campaign.result, campaign.problem
     columns = _columns(result, problem)
     _, sigma, turned = np.linalg.svd(result.stack.factor)
-    anchor, title = campaign.anchor("weakest"), campaign.titled("What shows least")
+    blocks: list[Block] = [_direction_table(columns, turned[-1])]
     if sigma[-1] <= _SINGULAR * sigma[0]:
         words = "A combination of parameters does not show at all: the stack is singular."
-        return PageSection(anchor, title, (_direction_table(columns, turned[-1]),), words)
-    blocks: list[Block] = [
-        _direction_table(columns, turned[-1]),
-        _parameter_table(result, columns, row_unit(problem)),
-    ]
-    if len(result.effect_names):
-        listed = ", ".join(result.effect_names)
-        blocks.append(Text(f"Columns of effects stand beside the base parameters: {listed}."))
-    return PageSection(anchor, title, tuple(blocks), _words(columns, sigma, turned[-1]))
+    else:
+        words = _words(columns, sigma, turned[-1])
+        blocks.append(_parameter_table(result, columns, row_unit(problem)))
+        if listed := ", ".join(result.effect_names):
+            blocks.append(f"Columns of effects stand beside the base parameters: {listed}.")
+    return Section("weakest", "What shows least", tuple(blocks), words)
 
 
 def _words(columns: _Columns, sigma: Array, direction: Array) -> str:
@@ -80,68 +77,59 @@ def _columns(result: Result, problem: Problem) -> _Columns:
     )
 
 
-def _direction_table(columns: _Columns, direction: Array) -> TableBlock:
+def _direction_table(columns: _Columns, direction: Array) -> Table:
     """The largest parts of the direction: coefficient and share, what the parameter groups."""
     order = np.argsort(-np.abs(direction))[:_SHOWN]
     sign = 1.0 if direction[order[0]] > 0 else -1.0
-    rows = tuple(
-        (
-            columns.names[i],
-            f"{sign * direction[i]:+.2f}",
-            f"{100 * direction[i] ** 2:.0f} %",
-            _shortened(columns.words[i]),
-        )
+    rows = (
+        {
+            "base parameter": columns.names[i],
+            "coefficient [–]": f"{sign * direction[i]:+.2f}",
+            "share [–]": f"{100 * direction[i] ** 2:.0f} %",
+            "represents": _shortened(columns.words[i]),
+        }
         for i in order
     )
     left = 1.0 - float((direction[order] ** 2).sum())
     rest = len(direction) - len(order)
     note = f"The other {rest} make up {100 * left:.0f} %." if rest else ""
-    return TableBlock(
-        ("base parameter", "coefficient [–]", "share [–]", "represents"),
+    return Table.of(
+        "The weakest direction",
         rows,
-        title="The weakest direction",
-        right=frozenset({1, 2}),
-        wordy=frozenset({3}),
+        left=("base parameter",),
+        words=("represents",),
         note=note,
     )
 
 
-def _parameter_table(result: Result, columns: _Columns, unit: str) -> TableBlock:
+def _parameter_table(result: Result, columns: _Columns, unit: str) -> Table:
     """Standard deviations for noise of one unit per row of the stack, the worst known first."""
     inverse = np.linalg.pinv(result.stack.factor)
     std = columns.scales * np.linalg.norm(inverse, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         relative = std / np.abs(columns.expected)
     order = np.argsort(-np.where(np.isfinite(relative), relative, 0.0))
-    rows = tuple(
-        (
-            columns.names[i],
-            columns.units[i] or "–",
-            in_figures(float(columns.expected[i])),
-            in_figures(float(std[i])),
-            _percent(float(relative[i])),
-        )
+    rows = (
+        {
+            "base parameter": columns.names[i],
+            "unit": columns.units[i] or "–",
+            "by the URDF": in_figures(float(columns.expected[i])),
+            "std": in_figures(float(std[i])),
+            "of the value": relative_in_words(relative[i]) if np.isfinite(relative[i]) else "–",
+        }
         for i in order
     )
     plain = bool(np.all(result.row_weights == 1.0))
     noise = f"1 {unit}" if plain else "one weighted unit"
-    return TableBlock(
-        ("base parameter", "unit", "by the URDF", "std", "of the value"),
+    return Table.of(
+        f"How well each base parameter would be known, for noise of {noise} per sample",
         rows,
-        title=f"How well each base parameter would be known, for noise of {noise} per sample",
-        right=frozenset({2, 3, 4}),
+        left=("base parameter", "unit"),
         note=f"Independent noise of {noise} on each of the {result.stack.rows} rows of the stack "
         "(samples of the cost grid times measured rows); the deviation goes with the noise, and "
         "with one over the root of the number of samples. Worst known first.",
         folded=True,
     )
-
-
-def _percent(share: float) -> str:
-    """A share of the value; beyond ten times the value the figure says no more."""
-    if not np.isfinite(share):
-        return "–"
-    return f"{100 * share:.3g} %" if share < 10 else "> 1000 %"
 
 
 def _shortened(words: str, longest: int = 120) -> str:

@@ -8,8 +8,8 @@ import pytest
 from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.excitation.nearest import closest_time
 from excite_cli.geometry.coal_distances import CoalDistances
-from excite_cli.report.campaign import RebuiltResult, in_figures
-from excite_cli.report.condition_section import posture_chart
+from excite_cli.report.chart import in_figures
+from excite_cli.report.posture_chart import posture_chart
 from excite_cli.trajectory.fade import Segment
 from tests.report.case import Case
 
@@ -21,7 +21,7 @@ PATH = re.compile(
 @pytest.fixture(scope="module")
 def svg(case: Case) -> str:
     problem, result = case
-    return posture_chart(RebuiltResult("smoke", result, problem)).svg
+    return posture_chart(problem, result.motions[0]).svg
 
 
 def test_the_nearest_two_are_those_of_coal(case: Case, svg: str) -> None:
@@ -41,7 +41,7 @@ def test_the_nearest_two_are_those_of_coal(case: Case, svg: str) -> None:
     assert widths == pytest.approx([2 * r * scale for r in radii], abs=0.11)
     length = np.hypot(float(line[2]) - float(line[0]), float(line[3]) - float(line[1]))
     assert length <= distances.min() * scale + 0.2
-    chart = posture_chart(RebuiltResult("smoke", result, problem))
+    chart = posture_chart(problem, result.motions[0])
     assert f"distance {in_figures(1e3 * distances.min())} mm" in chart.caption
     assert kept.capsules[first].name in chart.alternative
 

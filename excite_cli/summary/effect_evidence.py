@@ -4,51 +4,29 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from excite_cli.diagnosis.records import Diagnosis, JointAlias, NamedEffect
+from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.diagnosis.traces import EffectTrace, Traces
 from excite_cli.diagnosis.words import (
     SMALL_PART,
     approximation_in_words,
     by_worth,
     counted,
-    covariate_in_words,
     held_out_in_words,
     p_in_words,
     place_in_words,
-    title_of,
     value_in_words,
 )
 from excite_cli.effects.base import Effect, Picture
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.report.effect_chart import Cloud, cloud_of, cloud_plot, together, window_plot
-from excite_cli.report.page import Block, Charts, Fold, PageSection, Text
 from excite_cli.report.plot import Plot
+from excite_cli.shown.answer import Block, Charts, Detail, Fold, Section
+from excite_cli.summary.named_effects import joint_alias_in_words, other_names
 
 
-def effect_section(found: Diagnosis) -> PageSection | None:
-    """The section, or None if nothing was found."""
-    if not found.effects:
-        return None
-    if found.traces is None:
-        old = Text(
-            "The file holds no samples to draw: it was written by an earlier version. Run "
-            "`excite diagnose` again to have the pictures."
-        )
-        return PageSection("diagnosis-evidence", "Evidence", (old,))
-    large, small = by_worth(found.effects, found)
-    blocks: list[Block] = []
-    whole = friction_plots(found, found.traces)
-    if whole:
-        blocks.append(Charts(whole, "The parts of a joint's friction together"))
-    if large:
-        blocks.append(
-            Charts(effect_plots(found, found.traces, large), "One by one, the largest first")
-        )
-    if small:
-        cards = effect_plots(found, found.traces, small)
-        what = counted(len(small), "small effect")
-        text = f"{what} (each below {SMALL_PART:.0%} of the error reduction)"
-        blocks.append(Fold(text, (Charts(cards),)) if large else Charts(cards))
+def evidence_section(found: Diagnosis, detail: Detail) -> Section:
+    """Cards on a page."""
+    blocks = _cards(found) if detail == Detail.PAGE else ()
     lead = (
         "Partial residual: the measured torque of the training data less all other terms of the "
         "model, over the quantity that the effect is a function of. If the effect is present, the "
@@ -56,7 +34,24 @@ def effect_section(found: Diagnosis) -> PageSection | None:
         "medians lie about zero. Samples in which the joint stands or reverses are left "
         "out, as in the fit."
     )
-    return PageSection("diagnosis-evidence", "Evidence", tuple(blocks), lead)
+    return Section("diagnosis-evidence", "Evidence", blocks, lead)
+
+
+def _cards(found: Diagnosis) -> tuple[Block, ...]:
+    if found.traces is None or not found.effects:
+        return ()
+    large, small = by_worth(found.effects, found)
+    groups = (
+        Charts(friction_plots(found, found.traces), "The parts of a joint's friction together"),
+        Charts(effect_plots(found, found.traces, large), "One by one, the largest first"),
+    )
+    blocks: list[Block] = [group for group in groups if group.charts]
+    if small:
+        cards = Charts(effect_plots(found, found.traces, small))
+        what = counted(len(small), "small effect")
+        text = f"{what} (each below {SMALL_PART:.0%} of the error reduction)"
+        blocks.append(Fold(text, (cards,)) if large else cards)
+    return tuple(blocks)
 
 
 def effect_plots(
@@ -70,7 +65,7 @@ def effect_plots(
         if trace is None:
             continue
         place = place_in_words(named.effect, len(found.joint_names))
-        title = f"{_capital(title_of(named.effect.kind))}: {place}"
+        title = f"{named.effect.kind}: {place}"
         for row, joint in enumerate(trace.rows):
             cloud = cloud_of(trace, row, units[joint])
             if not len(cloud.x):
@@ -96,46 +91,27 @@ def _trace_of(named: NamedEffect, traces: Traces) -> EffectTrace | None:
     return next((t for t in traces.effects if (t.kind, t.joints, t.runs, t.covariate) == key), None)
 
 
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
-
-
 def _caption(found: Diagnosis, named: NamedEffect) -> str:
     values = "; ".join(value_in_words(name, value) for name, value in named.parameters.items())
-    text = (
-        f"{values}. p {p_in_words(named.p_value, named.least_p)}; explains "
-        f"{named.share_of_residual:.2%} of the residual; "
-        f"lowers the cross-validation error by {named.gain:.1%}."
-    )
+    said = [
+        values,
+        f"p {p_in_words(named.p_value, named.least_p)}; explains {named.share_of_residual:.2%} of "
+        f"the residual; lowers the cross-validation error by {named.gain:.1%}",
+    ]
     if told := held_out_in_words(named):
-        text += f" Held-out, without it: {told}."
+        said.append(f"Held-out, without it: {told}")
     everything = len(found.joint_names)
-    if named.aliases:
-        others = [f"{title_of(a.kind)} on {place_in_words(a, everything)}" for a in named.aliases]
-        text += f" These data cannot distinguish it from: {', '.join(others)}."
-    for alias in found.joint_aliases:
-        text += _jointly(named, alias, everything)
-    if named.approximates:
-        what = approximation_in_words(named.approximates, covariate_in_words)
-        text += f" A surrogate term; likely true form: {what}."
-    return text
-
-
-def _jointly(named: NamedEffect, alias: JointAlias, everything: int) -> str:
-    """What these data cannot tell from it and another, or from it where that is a pair."""
     own = (named.effect.kind, named.effect.joints, named.effect.runs)
-    beside = [each for each in alias.named if (each.kind, each.joints, each.runs) != own]
-    if len(beside) == len(alias.named):
-        return ""
-    others, company = (
-        " with ".join(f"{title_of(a.kind)} on {place_in_words(a, everything)}" for a in side)
-        for side in (alias.others, beside)
-    )
-    whole = f"it{f' with {company}' if company else ''}"
-    if alias.same_torque:
-        same = f" {whole.capitalize()} is the same torque as {others}"
-        return f"{same}: no motion distinguishes them."
-    return f" These data cannot distinguish {whole} from: {others}."
+    said += other_names(named, everything)
+    said += [
+        joint_alias_in_words(alias, everything)
+        for alias in found.joint_aliases
+        if own in [(each.kind, each.joints, each.runs) for each in alias.named]
+    ]
+    if named.approximates:
+        form = approximation_in_words(named.approximates)
+        said.append(f"A surrogate term; likely true form: {form}")
+    return "".join(f"{each}. " for each in said).rstrip()
 
 
 def _picture(trace: EffectTrace) -> Picture:
@@ -163,7 +139,7 @@ def friction_plots(found: Diagnosis, traces: Traces) -> tuple[Plot, ...]:
         if len(parts) < 2 or not _same_samples(parts):
             continue
         clouds: list[Cloud] = [cloud_of(trace, 0, units[joint]) for trace in parts]
-        names = ", ".join(title_of(trace.kind) for trace in parts)
+        names = ", ".join(trace.kind for trace in parts)
         charts.append(cloud_plot(f"Friction of {joint}", together(clouds), f"{names}."))
     return tuple(charts)
 

@@ -1,0 +1,200 @@
+"""The charts of a page as still pictures: what its script draws on a screen, for paper."""
+
+from collections.abc import Iterator, Sequence
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from excite_cli.report.chart import Colour
+from excite_cli.report.plot import Curve, Look, Panel, Plot
+from excite_cli.report.rows_chart import Form, Mark, RowsChart
+from excite_cli.report.style import (
+    BLUE,
+    FORBIDDEN,
+    GREEN,
+    GREY,
+    HELD_OUT,
+    PURPLE,
+    VERMILION,
+    WIDTH,
+    logarithmic,
+    matplotlib_part,
+    new_figure,
+    styled,
+)
+from excite_cli.robot.model import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_COLOURS: dict[Colour, str] = {
+    "ink": "black", "muted": GREY, "blue": BLUE, "vermilion": VERMILION, "green": GREEN,
+    "purple": PURPLE,
+}  # fmt: skip
+_LOOKS: dict[Look, dict[str, Any]] = {
+    "line": {"linewidth": 1.1},
+    "dashed": {"linewidth": 0.9, "linestyle": (0, (3, 1.5))},
+    "dotted": {"linewidth": 0.9, "linestyle": (0, (1, 1))},
+    "joined": {"linewidth": 1.1, "marker": "o", "markersize": 2.0},
+    "dots": {"linestyle": "none", "marker": "o", "markersize": 2.0, "alpha": 0.45},
+    "marks": {"linestyle": "none", "marker": "o", "markersize": 3.2},
+    "rings": {"linestyle": "none", "marker": "o", "markersize": 4.0, "markerfacecolor": "white"},
+}
+_FORMS: dict[Form, dict[str, Any]] = {
+    "dot": {"marker": "o"},
+    "ring": {"marker": "o", "markerfacecolor": "white"},
+    "cross": {"marker": "x"},
+    "tick": {"marker": "|", "markersize": 9, "markeredgewidth": 2},
+}
+_INCH = 1 / 100.0  # of a pixel of a panel's height
+_ALONE = 1.7  # times as high where there is one chart on a line
+_LABELLED = 12  # points of one chart at most, beside which their values stand
+_LETTER = 0.075  # in, of a title
+_HEAD, _LINE, _BELOW, _LEFT, _RIGHT = 0.62, 0.18, 0.44, 0.6, 0.08  # in
+
+
+@styled
+def draw_plots(title: str, plots: Sequence[Plot], columns: int) -> "Figure":
+    """Plots in reading order, `columns` side by side, under one title and one legend."""
+    rows = -(-len(plots) // columns)
+    wide = (WIDTH - _RIGHT) / columns
+    titles = ["\n".join(wrap(plot.title, int((wide - _LEFT) / _LETTER))) for plot in plots]
+    over = _LINE * max(title.count("\n") + 1 for title in titles) + 0.04
+    tall = max(sum(panel.height for panel in plot.panels) for plot in plots) * _INCH
+    tall *= _ALONE if columns == 1 else 1.0
+    height = _HEAD + rows * (over + tall + _BELOW)
+    figure = new_figure(height, constrained=False)
+    for number, plot in enumerate(plots):
+        row, column = divmod(number, columns)
+        left = column * wide + _LEFT
+        top = height - _HEAD - row * (over + tall + _BELOW) - over
+        grid = figure.add_gridspec(
+            len(plot.panels), 1, left=left / WIDTH, right=(column + 1) * wide / WIDTH,
+            top=top / height, bottom=(top - tall) / height, hspace=0.12,
+            height_ratios=[panel.height for panel in plot.panels],
+        )  # fmt: skip
+        _plot_figure_draw(figure, grid, plot, titles[number])
+    figure.suptitle(title, x=0.12 / WIDTH, y=1 - 0.08 / height, ha="left", va="top")
+    _one_legend(
+        figure, loc="upper left", columnspacing=1.4, handlelength=1.8,
+        bbox_to_anchor=(0.02 / WIDTH, 1 - 0.28 / height),
+    )  # fmt: skip
+    return figure
+
+
+def _plot_figure_draw(figure: "Figure", grid: Any, plot: Plot, title: str) -> None:
+    """One plot: its panels under each other over one x."""
+    first: Axes | None = None
+    for number, panel in enumerate(plot.panels):
+        axes = figure.add_subplot(grid[number], sharex=first)
+        first = first or axes
+        axes.tick_params(pad=2, labelbottom=number == len(plot.panels) - 1)
+        for low, high in plot.shaded:
+            axes.axvspan(low, high, color=HELD_OUT, linewidth=0, label="_")
+        _draw_panel(axes, plot.x, panel)
+        if plot.counted and len(plot.x) <= _LABELLED:
+            _label(axes, plot.x, panel)
+        axes.set_ylabel(panel.axis, labelpad=2)
+    assert first is not None
+    first.set_title(title)
+    first.set_xlim(*(plot.span or (float(np.min(plot.x)), float(np.max(plot.x)))))
+    axes.set_xlabel(plot.axis, labelpad=2)
+    axes.xaxis.set_major_locator(
+        matplotlib_part("ticker").MaxNLocator(6, integer=plot.counted, steps=(1, 2, 5, 10))
+    )
+
+
+def _draw_panel(axes: "Axes", x: Array, panel: Panel) -> None:
+    for series in panel.series:
+        _draw_series(axes, x, series)
+    if panel.logarithmic:
+        values = np.concatenate([series.y for series in panel.series])
+        logarithmic(axes, values[np.isfinite(values)])
+    else:
+        axes.yaxis.set_major_locator(matplotlib_part("ticker").MaxNLocator(4, steps=(1, 2, 5, 10)))
+    shown = axes.get_ylim() if panel.span is None else panel.span
+    low, high = panel.limits
+    for one, two in _forbidden(shown, low, high):
+        axes.axhspan(one, two, color=FORBIDDEN, linewidth=0, label="_")
+    axes.set_ylim(*shown)
+
+
+def _label(axes: "Axes", x: Array, panel: Panel) -> None:
+    """The values beside the points, once where points of two series are one."""
+    told = {
+        (at, y): series.colour
+        for series in panel.series
+        for at, y in zip(x, series.y, strict=True)
+        if np.isfinite(y)
+    }
+    for (at, y), colour in told.items():
+        axes.annotate(f"{y:.3g}", (at, y), xytext=(0, 5), textcoords="offset points", ha="center",
+                      color=_COLOURS[colour], fontsize=8.5)  # fmt: skip
+
+
+def _forbidden(
+    shown: tuple[float, float], low: float, high: float
+) -> Iterator[tuple[float, float]]:
+    if low > shown[0]:
+        yield shown[0], low
+    if high < shown[1]:
+        yield high, shown[1]
+
+
+def _draw_series(axes: "Axes", x: Array, series: Curve) -> None:
+    there = ~np.isinf(series.y)
+    colour = _COLOURS[series.colour]
+    axes.plot(x[there], series.y[there], color=colour, label=series.label, **_LOOKS[series.look])
+    if series.low is not None and series.high is not None:
+        ends = np.stack([series.low, series.high])[:, there & np.isfinite(series.low)]
+        axes.vlines(x[there & np.isfinite(series.low)], *ends, color=colour, linewidth=0.8)
+
+
+@styled
+def draw_rows(title: str, charts: Sequence[RowsChart]) -> "Figure":
+    """Charts of rows side by side, under one title and one legend; those without rows left out."""
+    charts = [chart for chart in charts if chart.rows]
+    figure = new_figure(1.3 + 0.24 * max((len(chart.rows) for chart in charts), default=1))
+    drawn = figure.subplots(1, max(len(charts), 1), squeeze=False)[0]
+    for axes, chart in zip(drawn, charts, strict=False):
+        _draw_rows(axes, chart)
+    figure.suptitle(title, x=0.12 / WIDTH, ha="left")
+    _one_legend(figure, loc="outside lower center")
+    return figure
+
+
+def _draw_rows(axes: "Axes", chart: RowsChart) -> None:
+    named: dict[str, list[tuple[int, Mark]]] = {}
+    for number, row in enumerate(chart.rows):
+        for bar in row.bars:
+            axes.hlines(number, bar.low, bar.high, color=_COLOURS[bar.colour], linewidth=1.0)
+        for mark in row.marks:
+            named.setdefault(mark.word, []).append((number, mark))
+    for word, marks in named.items():
+        first = marks[0][1]
+        axes.plot(
+            [mark.x for _, mark in marks],
+            [number for number, _ in marks],
+            color=_COLOURS[first.colour],
+            label=word,
+            linestyle="none",
+            clip_on=False,
+            **_FORMS[first.form],
+        )
+    axes.set_yticks(range(len(chart.rows)), [row.name for row in chart.rows])
+    axes.set_ylim(len(chart.rows) - 0.5, -0.5)
+    axes.set_xscale("log" if chart.axis.logarithmic else "linear")
+    axes.set_xlim(chart.axis.low, chart.axis.high)
+    axes.set_xticks(chart.axis.ticks, [f"{tick:g}" for tick in chart.axis.ticks])
+    axes.xaxis.set_minor_locator(matplotlib_part("ticker").NullLocator())
+    axes.set_xlabel(chart.axis.label)
+
+
+def _one_legend(figure: "Figure", **where: Any) -> None:
+    named: dict[str, Any] = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            named.setdefault(label, handle)
+    figure.legend(named.values(), named, ncols=max(len(named), 1), **where)

@@ -1,0 +1,121 @@
+"""The robot at the instant of a motion at which it comes nearest to something, as its capsules.
+
+Seen from afar a capsule is a thick line with round ends, so that the drawing is a few lines of
+SVG in the page's own colours, needs no mesh and shows what the constraints see.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.constraints.drawing import NearestBodies
+from excite_cli.dynamics.forward_kinematics import States
+from excite_cli.excitation.motion import Motion
+from excite_cli.excitation.nearest import closest_time, nearest_bodies
+from excite_cli.excitation.problem import Problem
+from excite_cli.geometry.link_meshes import Poses
+from excite_cli.geometry.obstacles import Box
+from excite_cli.report.chart import Chart, in_figures, side_view, svg_line
+from excite_cli.robot.model import Array
+from excite_cli.trajectory.fade import Segment
+
+_WIDTH, _HEIGHT, _MARGIN = 284.0, 210.0, 8.0  # pt
+_THIN = 0.012  # [m] radius of a line between joints, where there are no capsules
+_EDGES = [(i, j) for i in range(8) for j in range(i) if (i ^ j).bit_count() == 1]
+
+
+@dataclass(frozen=True)
+class _Stick:
+    start: Array
+    end: Array
+    radius: float
+    near: bool = False
+
+
+def posture_chart(problem: Problem, motion: Motion) -> Chart:
+    """The robot where its first `motion` has least room."""
+    segment = Segment("", problem.trajectory, motion.coefficients)
+    at = closest_time(problem, segment)
+    states = States(
+        problem.kinematics, *problem.trajectory.states(np.array([at]), motion.coefficients)
+    )
+    poses = Poses.of(problem.robot, states.q)
+    margins = [constraint.margins(states) for constraint in problem.constraints]
+    near = nearest_bodies(problem, poses, margins)
+    name = problem.robot.name
+    if near is None:
+        words = f"{name} at {in_figures(at)} s of its first motion"
+    else:
+        words = (
+            f"{name} at {in_figures(at)} s of its first motion, where it has least room; nearest: "
+            f"{near.labels[0]}, distance {in_figures(1e3 * float(near.distances[0]))} mm"
+        )
+    capsules = " Capsules as the constraints see them." if near is not None else ""
+    caption = f"{words}.{capsules} `excite view` plays all motions."
+    svg = _drawn(_sticks(problem, poses, near), _boxes(problem), near)
+    return Chart(f"{name} in its first motion", svg, f"{words}.", caption)
+
+
+def _sticks(problem: Problem, poses: Poses, near: NearestBodies | None) -> list[_Stick]:
+    """Capsules that constraints look at; where there are none, lines between the joints."""
+    close = near.capsules[0] if near is not None else ()
+    found = {
+        id(capsule): capsule for each in problem.constraints for capsule in each.drawing.capsules
+    }
+    if found:
+        return [
+            _Stick(
+                poses.points(c.joint, c.start)[0],
+                poses.points(c.joint, c.end)[0],
+                c.radius,
+                any(c is other for other in close),
+            )
+            for c in found.values()
+        ]
+    places, parents = poses.translations[0], problem.robot.model.parents
+    return [_Stick(places[parents[j]], places[j], _THIN) for j in range(1, len(places))]
+
+
+def _boxes(problem: Problem) -> list[Array]:
+    """Corners (8, 3) of the boxes that stand around."""
+    signs = np.array([[1 if k & bit else -1 for bit in (1, 2, 4)] for k in range(8)])
+    found = {
+        id(each): each
+        for constraint in problem.constraints
+        for each in constraint.drawing.obstacles
+        if isinstance(each, Box)
+    }
+    return [(signs * box.half) @ box.rotation.T + box.position for box in found.values()]
+
+
+def _drawn(sticks: list[_Stick], boxes: list[Array], near: NearestBodies | None) -> str:
+    """SVG: what is behind first; each capsule with a rim, the nearest in vermilion."""
+    ends = np.array([[stick.start, stick.end] for stick in sticks])
+    radii = np.array([stick.radius for stick in sticks])
+    flat, depth = side_view(ends)
+    reach = np.concatenate([flat - radii[:, None, None], flat + radii[:, None, None]])
+    corners = [side_view(box)[0] for box in boxes]
+    every = np.vstack([reach.reshape(-1, 2), *corners])
+    low, size = every.min(axis=0), np.ptp(every, axis=0)
+    room = np.array([_WIDTH, _HEIGHT]) - 2 * _MARGIN
+    scale = float((room / np.maximum(size, 1e-9)).min())
+    shift = _MARGIN + (room - size * scale) / 2 - low * scale
+    parts = [f'<svg viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}">']
+    for box in corners:
+        placed = box * scale + shift
+        parts += [svg_line(placed[i], placed[j], 0.8, "var(--muted)") for i, j in _EDGES]
+    middle = depth.mean(axis=1)
+    far, span = middle.min(), max(float(np.ptp(middle)), 1e-9)
+    for k in np.argsort(middle, kind="stable"):
+        one, two = flat[k] * scale + shift
+        width = max(2.0 * radii[k] * scale, 1.6)
+        light = 22 + 30 * (middle[k] - far) / span  # what is nearer is darker
+        fill = f"color-mix(in oklab, var(--muted) {light:.0f}%, var(--card))"
+        if sticks[k].near:
+            fill = "color-mix(in oklab, var(--vermilion) 75%, var(--card))"
+        parts.append(svg_line(one, two, width, "var(--muted)"))
+        parts.append(svg_line(one, two, max(width - 1.4, 0.9), fill))
+    if near is not None:
+        one, two = side_view(near.ends[0])[0] * scale + shift
+        parts.append(svg_line(one, two, 1.6, "var(--vermilion)"))
+    return "".join([*parts, "</svg>"])

@@ -1,0 +1,141 @@
+"""One page from several files: what each kind has to say, and several of a kind side by side."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from excite_cli.diagnosis.answer_words import answer_in_words
+from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.result import Result
+from excite_cli.identification.stored_model import StoredFit
+from excite_cli.scoring.records import Score
+from excite_cli.shown.answer import KeyFigure, Page, Section, Text
+from excite_cli.summary.diagnosis import diagnosis_figures, diagnosis_sections
+from excite_cli.summary.identification import fit_figures, fit_sections
+from excite_cli.summary.pairs import doubts_in_words
+from excite_cli.summary.result_page import result_figures, result_sections
+from excite_cli.summary.score import score_figures, score_sections, sentences
+from excite_cli.summary.side_by_side import (
+    comparable,
+    compare_diagnoses,
+    compare_fits,
+    compare_results,
+)
+
+
+@dataclass(frozen=True)
+class Source:
+    """One file of a report.
+
+    `name` tells it from the others on the page, `file` is its file name. A result needs the
+    `problem` that it was made for, and may show a `picture` of its robot.
+    """
+
+    name: str
+    file: str
+    content: Result | StoredFit | Diagnosis | Score
+    problem: Problem | None = None
+    picture: bool = True
+
+
+@dataclass(frozen=True)
+class _Part:
+    """What one source says."""
+
+    source: Source
+    figures: Sequence[KeyFigure]
+    sections: Sequence[Section]
+    answers: tuple[Text, ...] = ()
+
+
+def page_of(sources: Sequence[Source], show: Callable[[str, int], None]) -> Page:
+    """The page of `sources`, in their order; `show(name, done)` hears what is being drawn."""
+    parts = []
+    for done, source in enumerate(sources):
+        show(source.name, done)
+        parts.append(_part(source))
+    sections = [section for part in _distinct(parts) for section in part.sections]
+    figures = [figure for part in _distinct(parts) for figure in part.figures]
+    compared = _compared(sources)
+    # Runs of one problem are there to be compared; files of a loop are there to be read in order.
+    results = [source.content for source in sources if isinstance(source.content, Result)]
+    first = len(results) == len(sources) and comparable(results)
+    return Page(
+        _title(sources),
+        "Made by excite from " + ", ".join(source.file for source in sources),
+        tuple(figures),
+        (*compared, *sections) if first else (*sections, *compared),
+        tuple(answer for part in parts for answer in part.answers),
+    )
+
+
+def _part(source: Source) -> _Part:
+    content, problem = source.content, source.problem
+    if isinstance(content, Result):
+        assert problem is not None, "a result is reported with its problem"
+        sections = result_sections(content, problem, source.name, source.picture)
+        doubts = tuple(
+            Text(f"{source.file}: {words}. Its margins here are taken anew, its condition numbers "
+                 "are those that the file states. `excite check CONFIG FILE.h5` judges it.", "bad")
+            for words in doubts_in_words(content.motions)
+        )  # fmt: skip
+        return _Part(source, result_figures(content, problem), sections, doubts)
+    if isinstance(content, StoredFit):
+        return _Part(source, fit_figures(content), fit_sections(content))
+    if isinstance(content, Score):
+        told = Text(" ".join(sentences(content)), "bad" if content.alarms else "answer")
+        return _Part(source, score_figures(content), score_sections(content), (told,))
+    answer = Text(answer_in_words(content), "answer" if content.good else "bad")
+    return _Part(source, diagnosis_figures(content), diagnosis_sections(content), (answer,))
+
+
+def _distinct(parts: Sequence[_Part]) -> list[_Part]:
+    """Titles, anchors and names of figures that occur twice say which file they belong to."""
+    titles = Counter(section.title for part in parts for section in part.sections)
+    anchors = Counter(section.anchor for part in parts for section in part.sections)
+    names = Counter(figure.name for part in parts for figure in part.figures)
+    found = []
+    for number, part in enumerate(parts, start=1):
+        of = part.source.name
+        sections = tuple(
+            replace(
+                section,
+                title=f"{section.title}: {of}" if titles[section.title] > 1 else section.title,
+                anchor=f"{section.anchor}-{number}"
+                if anchors[section.anchor] > 1
+                else section.anchor,
+            )
+            for section in part.sections
+        )
+        figures = tuple(
+            replace(figure, name=f"{figure.name}, {of}") if names[figure.name] > 1 else figure
+            for figure in part.figures
+        )
+        found.append(replace(part, sections=sections, figures=figures))
+    return found
+
+
+def _compared(sources: Sequence[Source]) -> tuple[Section, ...]:
+    """Sections that put several files of a kind side by side."""
+    results = {s.name: s.content for s in sources if isinstance(s.content, Result)}
+    fits = {s.name: s.content for s in sources if isinstance(s.content, StoredFit)}
+    diagnoses = {s.name: s.content for s in sources if isinstance(s.content, Diagnosis)}
+    return (
+        *([compare_results(results)] if len(results) > 1 else []),
+        *([compare_fits(fits)] if len(fits) > 1 else []),
+        *([compare_diagnoses(diagnoses)] if len(diagnoses) > 1 else []),
+    )
+
+
+def _title(sources: Sequence[Source]) -> str:
+    names: dict[type, str] = {
+        Result: "motions",
+        StoredFit: "identified parameters",
+        Diagnosis: "diagnosis",
+        Score: "score",
+    }
+    robots = dict.fromkeys(s.problem.robot.name for s in sources if s.problem is not None)
+    kinds = (kind for source in sources for kind in names if isinstance(source.content, kind))
+    words = ", ".join(names[kind] for kind in dict.fromkeys(kinds))
+    return f"{', '.join(robots)}: {words}" if robots else words.capitalize()
