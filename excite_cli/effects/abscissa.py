@@ -1,11 +1,15 @@
 """What the torque of an effect is a function of, and drawn over."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from excite_cli.effects.signals import Signals
-from excite_cli.robot.model import Array
+if TYPE_CHECKING:
+    from excite_cli.effects.signals import Signals
+    from excite_cli.robot.model import Array
+
 
 Quantity = Literal["position", "speed", "acceleration", "load", "time", "covariate"]
 

@@ -1,11 +1,6 @@
-"""The catalogue: every kind of effect by its name; users' own come through an entry point.
-
-A package that declares, in the group `excite.effects`, a name for a subclass of `Effect` adds it.
-"""
+"""All effects by their kind, and those that a config or a description declares."""
 
 from collections.abc import Mapping
-from functools import cache
-from importlib.metadata import entry_points
 
 import numpy as np
 
@@ -41,71 +36,15 @@ from excite_cli.effects.torque_saturation import TorqueSaturation
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.effects.wrench_gain import WrenchGain
 from excite_cli.errors import ConfigError, nearest
-from excite_cli.packages import members, set_aside
+from excite_cli.registry import Registry
 from excite_cli.robot.model import Array, Robot
 
-GROUP = "excite.effects"
 # What every textbook's model of a joint has beside the rigid body; the rest of it where data ask.
 EVERYDAY_FRICTION = ("viscous_friction", "coulomb_friction")
 EVERYDAY = ("torque_offset", "armature")
-_OURS: tuple[type[Effect], ...] = (
-    ViscousFriction,
-    NonlinearViscousFriction,
-    CoulombFriction,
-    AsymmetricFriction,
-    StribeckFriction,
-    LoadDependentFriction,
-    PositionFriction,
-    DahlFriction,
-    FrictionDrift,
-    FrictionChange,
-    CovariateFriction,
-    CoupledFriction,
-    Armature,
-    Spring,
-    TorqueOffset,
-    CovariateOffset,
-    TorqueGain,
-    TorqueDelay,
-    WrenchGain,
-    TorqueSaturation,
-    Ripple,
-    CableForce,
-    Elasticity,
-    Backlash,
-    BaseTilt,
-    Payload,
-    EncoderOffset,
-    Contact,
-)
 
 
-@cache
-def catalogue() -> Mapping[str, type[Effect]]:
-    """All kinds by name.
-
-    An effect of a package that cannot be used is set aside, with an `ExciteWarning` that says why.
-    """
-    kinds = {effect.kind: effect for effect in _OURS}
-    needed = ("kind", "title", "parameters")
-    for whose, found in members(GROUP, Effect, needed, "effect"):  # type: ignore[type-abstract]
-        if found.kind in kinds:
-            set_aside(whose, f"there is another effect '{found.kind}'.")
-        else:
-            kinds[found.kind] = found
-    for kind in [each for each in kinds.values() if is_of_a_package(each)]:
-        if flaw := _names_of_none(kind, kinds):
-            set_aside(f"effect '{kind.kind}'", flaw)
-            del kinds[kind.kind]
-    return kinds
-
-
-def is_of_a_package(kind: type[Effect]) -> bool:
-    """Whether it came through an entry point: it may do what effects of ours never do."""
-    return kind not in _OURS
-
-
-def _names_of_none(kind: type[Effect], kinds: Mapping[str, type[Effect]]) -> str:
+def _flaw(kind: type[Effect], kinds: Mapping[str, type[Effect]]) -> str:
     """What `kind` says of kinds that there are not; empty if it says nothing of such."""
     for trait in ("refines", "excludes", "same_as", "deviates_from", "changes_of"):
         for name in getattr(kind, trait):
@@ -114,23 +53,53 @@ def _names_of_none(kind: type[Effect], kinds: Mapping[str, type[Effect]]) -> str
     return ""
 
 
-def kind_named(name: str, where: str = "effects") -> type[Effect]:
-    """The class of a kind.
+EFFECTS: Registry[Effect] = Registry(
+    "effect",
+    "excite.effects",
+    Effect,
+    (
+        ViscousFriction,
+        NonlinearViscousFriction,
+        CoulombFriction,
+        AsymmetricFriction,
+        StribeckFriction,
+        LoadDependentFriction,
+        PositionFriction,
+        DahlFriction,
+        FrictionDrift,
+        FrictionChange,
+        CovariateFriction,
+        CoupledFriction,
+        Armature,
+        Spring,
+        TorqueOffset,
+        CovariateOffset,
+        TorqueGain,
+        TorqueDelay,
+        WrenchGain,
+        TorqueSaturation,
+        Ripple,
+        CableForce,
+        Elasticity,
+        Backlash,
+        BaseTilt,
+        Payload,
+        EncoderOffset,
+        Contact,
+    ),
+    ("kind", "title", "parameters"),
+    _flaw,
+)
 
-    Raises
-    ------
-    ConfigError
-        There is none of this name.
-    """
-    kinds = catalogue()
-    if name not in kinds:
-        aside = any(point.name == name for point in entry_points(group=GROUP))
-        told = " A package has one, which cannot be used: see the warning." if aside else ""
-        raise ConfigError(
-            f"{where}: there is no effect '{name}'.{told or nearest(name, kinds)} "
-            f"Effects: {', '.join(kinds)}."
-        )
-    return kinds[name]
+
+def catalogue() -> Mapping[str, type[Effect]]:
+    """All kinds by name."""
+    return EFFECTS.members
+
+
+def kind_named(name: str, where: str = "effects") -> type[Effect]:
+    """The class of a kind; ConfigError if there is none of this name."""
+    return EFFECTS.named(name, where)
 
 
 def declared_effects(specs: tuple[EffectSpec, ...] | None, robot: Robot) -> tuple[Effect, ...]:

@@ -1,10 +1,15 @@
 """A parameter of an effect, and a value of it."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from excite_cli.robot.model import Array
+if TYPE_CHECKING:
+    from excite_cli.robot.model import Array
+
 
 Range = tuple[float, float]
 

@@ -1,8 +1,12 @@
 """How large the robot and its torques are, as the data show: what sizes of effects are held to."""
 
-from dataclasses import dataclass
+from __future__ import annotations
 
-from excite_cli.robot.model import Array
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from excite_cli.robot.model import Array
 
 
 @dataclass(frozen=True)

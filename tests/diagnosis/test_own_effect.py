@@ -13,7 +13,7 @@ import pytest
 
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect
-from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION, catalogue, kind_named
+from excite_cli.effects.catalogue import EFFECTS, EVERYDAY, EVERYDAY_FRICTION, kind_named
 from excite_cli.measurement.dataset import Dataset
 from tests.diagnosis.simulated_arm import ELBOW, ROBOT, PlantedEffect, planted, played, told
 from tests.effects import own_package
@@ -31,9 +31,9 @@ def own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[type[Effect]]:
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(folder)
         patch.delitem(sys.modules, own_package.MODULE, raising=False)
-        catalogue.cache_clear()
+        EFFECTS.forget()
         yield kind_named(OWN)
-    catalogue.cache_clear()
+    EFFECTS.forget()
 
 
 @pytest.fixture(scope="module")

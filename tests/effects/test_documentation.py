@@ -9,7 +9,7 @@ import pytest
 
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.effects.base import Effect
-from excite_cli.effects.catalogue import catalogue, declared_effects
+from excite_cli.effects.catalogue import EFFECTS, catalogue, declared_effects
 from excite_cli.effects.sign import sign_of_width
 from excite_cli.excitation.gradient_check import central_differences, relative_error
 from excite_cli.robot.model import Array
@@ -23,9 +23,9 @@ PAGE = (DOCS / "effects.md").read_text(encoding="utf-8")
 
 @pytest.fixture(autouse=True)
 def _catalogue_read_anew() -> Iterator[None]:
-    catalogue.cache_clear()
+    EFFECTS.forget()
     yield
-    catalogue.cache_clear()
+    EFFECTS.forget()
 
 
 @pytest.mark.parametrize("name", list(catalogue()))

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import excite_cli as api
-from excite_cli.effects.catalogue import catalogue, kind_named
+from excite_cli.effects.catalogue import EFFECTS, catalogue, kind_named
 from excite_cli.errors import ConfigError, ExciteWarning
 from tests.effects import own_package
 from tests.trust.conftest import SMOKE
@@ -55,9 +55,9 @@ FAILING = {
 
 @pytest.fixture(autouse=True)
 def _catalogue_read_anew(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    catalogue.cache_clear()
+    EFFECTS.forget()
     yield
-    catalogue.cache_clear()
+    EFFECTS.forget()
 
 
 @pytest.mark.parametrize("case", UNUSABLE)
