@@ -21,15 +21,17 @@ class Registry(Generic[Member]):
     """A family, whose entry points have the `group` excite.<family> and whose members are a `word`.
 
     `own`: the program's members, in order, subclasses of `base`. Each states all that is `needed`,
-    its name first. `flaw_in`: what else is wrong with a member beside the others, as a sentence.
+    its name first, unless `name_of` says what it is called. `flaw_in`: what else is wrong with a
+    member beside the others, as a sentence.
     """
 
     word: str
     group: str
-    base: type[Member]
+    base: type
     own: Sequence[type[Member]]
     needed: tuple[str, ...] = ("name",)
     flaw_in: Callable[[type[Member], Mapping[str, type[Member]]], str] | None = None
+    name_of: Callable[[type[Member]], str] | None = None
 
     @cached_property
     def members(self) -> Mapping[str, type[Member]]:
@@ -90,7 +92,7 @@ class Registry(Generic[Member]):
         return {point.name for point in entry_points(group=self.group)}
 
     def _name(self, member: type[Member]) -> str:
-        return str(getattr(member, self.needed[0]))
+        return self.name_of(member) if self.name_of else str(getattr(member, self.needed[0]))
 
     def _of_packages(self) -> Iterator[tuple[str, type[Member]]]:
         """Usable members, each with whose it is, for messages."""

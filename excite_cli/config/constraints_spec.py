@@ -12,6 +12,7 @@ from excite_cli.config.section import (
     Share,
     Vector3,
     kind_by,
+    name_in,
 )
 
 
@@ -188,7 +189,9 @@ class ConstraintsSpec(Section):
     )
     own: dict[str, dict[str, Finite]] = Field(
         default_factory=dict,
-        description="constraints that were added to the catalogue, by name, with their settings",
+        description="constraints without a section here, as those of packages, by name, with "
+        "their settings",
+        json_schema_extra=name_in("constraints"),
     )
 
     @field_validator("keep_out")

@@ -26,6 +26,7 @@ from excite_cli.config.section import (
     Power,
     Section,
     Share,
+    name_in,
 )
 from excite_cli.config.trajectory_spec import FourierSpec, SamplingSpec, TrajectorySpec
 from excite_cli.shown.record import Shown
@@ -100,24 +101,13 @@ class IdentifiedSpec(Section):
     )
 
 
-CriterionKind = Literal[
-    "condition_number",
-    "smooth_condition_number",
-    "log_det",
-    "sigma_min",
-    "trace_inverse",
-    "torque_deviation",
-    "condition_and_sigma_min",
-]
-
-
 class CriterionSpec(Section):
     """What is minimised, and how rows and columns of the regressor are weighted."""
 
-    kind: CriterionKind | str = Field(
+    kind: str = Field(
         "condition_number",
-        description="function of the singular values; see docs/criteria.md; or the name of one "
-        "that was added to the catalogue",
+        description="function of the singular values; see docs/criteria.md",
+        json_schema_extra=name_in("criteria"),
     )
     smoothing: Power = Field(64.0, description="p of the smooth condition number")
     row_weights: Literal["none", "effort"] | dict[str, Positive] = Field(

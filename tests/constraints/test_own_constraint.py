@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from excite_cli.config.load_spec import parse_spec, spec_as_yaml
-from excite_cli.constraints.catalogue import OWN
+from excite_cli.constraints.catalogue import CONSTRAINTS
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.admissible import path_of, worst_margins
 from excite_cli.excitation.inspection import Look, inspect
@@ -28,7 +28,7 @@ LIMIT = 4.0  # [W]
 @pytest.fixture(scope="module", autouse=True)
 def catalogue_line() -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(OWN, "joint_power", JointPower)
+        patch.setitem(CONSTRAINTS.members, "joint_power", JointPower)
         yield
 
 
