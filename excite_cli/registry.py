@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import EntryPoint, entry_points
-from typing import Generic, TypeVar
+from typing import Generic, TypeVar, cast
 
 from excite_cli.errors import ConfigError, ExciteWarning, nearest
 
@@ -55,6 +55,11 @@ class Registry(Generic[Member]):
     def foreign(self) -> Mapping[str, type[Member]]:
         """Those of packages."""
         return {name: each for name, each in self.members.items() if self.is_foreign(each)}
+
+    @property
+    def foreign_first(self) -> list[type[Member]]:
+        """Those of packages, then the program's own: who knows a special case is asked first."""
+        return [*self.foreign.values(), *self.own]
 
     def is_foreign(self, member: type[Member]) -> bool:
         """Whether it came through an entry point: it may do what own ones never do."""
@@ -115,4 +120,6 @@ class Registry(Generic[Member]):
         if inspect.isabstract(found):
             return None, f"it lacks {', '.join(sorted(getattr(found, '__abstractmethods__', ())))}"
         missing = [name for name in self.needed if not getattr(found, name, None)]
-        return (found, "") if not missing else (None, f"it does not state its {', '.join(missing)}")
+        if missing:
+            return None, f"it does not state its {', '.join(missing)}"
+        return cast(type[Member], found), ""

@@ -48,8 +48,8 @@ from excite_cli.errors import FileError
 from excite_cli.excitation.result import Result
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Array, Dataset
-from excite_cli.measurement.motion_files import motion_reader_for, read_motion
 from excite_cli.measurement.quality import raise_for_errors
+from excite_cli.motion_formats.catalogue import motion_format_of, read_motion
 from excite_cli.store.result_file import read_samples, write_result
 
 JOINTS = ("shoulder", "elbow", "wrist")
@@ -89,7 +89,7 @@ def _enter_data(path: Path) -> Dataset:
 
 def _enter_motion(path: Path) -> bool:
     """As `check` and `view`: a motion, if the file is one."""
-    if motion_reader_for(path) is None:
+    if motion_format_of(path) is None:
         return False
     read_motion(path, JOINTS)
     return True

@@ -1,18 +1,15 @@
 """What the shell offers after Tab: robots, formats, kinds of effects, keys of the config.
 
-Nothing here loads mathematics but the kinds of effects, and errors end in no offer: a Tab must
-neither wait nor print.
+Nothing here loads mathematics but the kinds of effects and names within a config, and errors end in
+no offer: a Tab must neither wait nor print.
 """
 
 from collections.abc import Callable
 
-MOTION_FORMATS = ("csv", "ros2", "rosbag2", "mcap", "moveit", "npz")
-MODEL_FORMATS = ("urdf", "mjcf", "yaml", "c")
-
 
 def complete_format(incomplete: str) -> list[str]:
     """Formats of `excite export`."""
-    return [name for name in (*MOTION_FORMATS, *MODEL_FORMATS) if name.startswith(incomplete)]
+    return _quietly(lambda: [name for name in _formats() if name.startswith(incomplete)])
 
 
 def complete_robot(incomplete: str) -> list[str]:
@@ -26,33 +23,49 @@ def complete_effect(incomplete: str) -> list[str]:
 
 
 def complete_key(incomplete: str) -> list[str]:
-    """Keys of the config, section by section: `optimizer.max_iterations=`."""
+    """Keys of the config, section by section, and names that they may have: `criterion.kind=`."""
     return _quietly(lambda: _keys(incomplete))
 
 
 def _robots() -> list[str]:
-    from excite_cli.api.schema import robot_names
+    from excite_cli.api.names import robot_names
 
     return robot_names()
 
 
 def _kinds() -> list[str]:
-    from excite_cli.api.schema import effect_kinds
+    from excite_cli.api.names import effect_kinds
 
     return effect_kinds()
+
+
+def _formats() -> list[str]:
+    from excite_cli.api.names import export_formats
+
+    return export_formats()
+
+
+def _words(key: str) -> tuple[list[str], list[str]]:
+    from excite_cli.api.schema import words_at
+
+    return words_at(key.split("."))
 
 
 def _keys(incomplete: str) -> list[str]:
     from excite_cli.config.section import Section
     from excite_cli.config.spec import Spec
 
+    key, equals, value = incomplete.partition("=")
+    if equals:
+        return [f"{key}={name}" for name in _words(key)[1] if name.startswith(value)]
     *path, last = incomplete.split(".")
     section: type[Section] | None = Spec
     for part in path:
         section = section.child(part, None) if section is not None else None
-    if section is None:
-        return []
     start = "".join(f"{part}." for part in path)
+    if section is None:  # below a mapping whose keys are names, as those of constraints
+        keys = _words(start[:-1])[0]
+        return [f"{start}{name}" for name in keys if name.startswith(last)]
     names = [name for name in section.model_fields if name.startswith(last)]
     return [start + name + ("." if section.child(name, None) else "=") for name in names]
 

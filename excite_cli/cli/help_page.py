@@ -21,6 +21,7 @@ WORK, OUTPUT, MESSAGES = "Workers", "Output files", "Messages"
 _LAST = (WORK, OUTPUT, MESSAGES)
 _INDENT, _FARTHER = 2, 6
 _NARROWEST, _WIDEST_NAMES = 50, 26
+_FAMILY = re.compile(r"\{(readers|motion titles|motion formats)\}")
 _BOLD, _PLAIN = "\x1b[1m", "\x1b[0m"
 _METAVARS = {"path": "FILE", "int": "N", "float": "X", "text": "TEXT", "str": "TEXT"}
 
@@ -44,6 +45,13 @@ class HelpfulCommand(TyperCommand):
         """Write the page."""
         write_page(self, ctx, formatter)
 
+    def shell_complete(self, ctx: Any, incomplete: str) -> Any:
+        """Options, each with its words."""
+        for param in self.get_params(ctx):
+            if param.param_type_name == "option":
+                param.help = words_of(param)  # type: ignore[attr-defined]
+        return super().shell_complete(ctx, incomplete)
+
 
 class HelpfulGroup(TyperGroup):
     """The program itself: its commands in groups."""
@@ -51,6 +59,21 @@ class HelpfulGroup(TyperGroup):
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the page."""
         write_page(self, ctx, formatter)
+
+
+def words_of(param: Any) -> str:
+    """The help of an option or argument, with the members of a family where it has `{readers}`."""
+    return _FAMILY.sub(lambda found: ", ".join(_members(found[1])), str(param.help or ""))
+
+
+def _members(family: str) -> list[str]:
+    from excite_cli.api import names
+
+    members = {
+        "readers": names.reader_titles, "motion titles": names.motion_titles,
+        "motion formats": names.motion_formats,
+    }  # fmt: skip
+    return members[family]()
 
 
 def usage_of(command: Any, ctx: Any) -> str:
@@ -94,7 +117,7 @@ def sections_of(command: Any, ctx: Any) -> dict[str, list[tuple[str, str]]]:
         if getattr(param, "hidden", False):
             continue
         if param.param_type_name == "argument":
-            row = (_argument(param), param.help or "")
+            row = (_argument(param), words_of(param))
             found.setdefault("Arguments", []).append(row)
         else:
             own = getattr(param, "rich_help_panel", None) or "Options"
@@ -117,7 +140,7 @@ def _option(param: Any, ctx: Any) -> tuple[str, str]:
         names += f" / {', '.join(param.secondary_opts)}"
     if not param.is_flag:
         names += f" {_metavar(param, ctx)}"
-    words = str(param.help or "").rstrip()
+    words = words_of(param).rstrip()
     default = param.default
     if param.required:
         words += " Must be given."

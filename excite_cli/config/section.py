@@ -56,7 +56,7 @@ def name_in(family: str) -> dict[str, Any]:
 
     Which there are, packages decide: `excite schema` puts their names in its place.
     """
-    return {"family": family}
+    return {"x-family": family}
 
 
 class Section(BaseModel):

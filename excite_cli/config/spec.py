@@ -11,6 +11,7 @@ from pydantic import Field, StrictBool
 from excite_cli.config.constraints_spec import ConstraintsSpec
 from excite_cli.config.data_spec import (
     DiagnosisSpec,
+    EffectKind,
     EffectSpec,
     IdentificationSpec,
     MeasurementSpec,
@@ -68,7 +69,7 @@ class UncertaintySpec(BodyUncertaintySpec):
 class IdentifiedEffectSpec(Section):
     """An effect with its values."""
 
-    kind: str = Field(description="one of the effects")
+    kind: EffectKind = Field(description="one of the effects")
     joints: tuple[str, ...] = Field(description="names of the joints that it acts on")
     shape: dict[str, Finite] = Field(
         default_factory=dict, description="values of its non-linear parameters"

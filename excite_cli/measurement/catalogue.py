@@ -27,12 +27,17 @@ from excite_cli.measurement.recording_limits import RecordingLimits
 from excite_cli.measurement.run_identity import Origin
 from excite_cli.measurement.torque import SECONDS, check_joints, check_motors, declared, to_joints
 from excite_cli.out_of_core import Spool
+from excite_cli.registry import Registry
 from excite_cli.workers.base import Tell
 from excite_cli.workers.context import each
 
-READERS: tuple[Reader, ...] = (
-    Hdf5Reader(), CsvReader(), BagReader(), MatReader(), ParquetReader(),
-)  # fmt: skip
+READERS: Registry[Reader] = Registry(
+    "reader",
+    "excite.readers",
+    Reader,
+    (Hdf5Reader, CsvReader, BagReader, MatReader, ParquetReader),
+    ("title", "suffixes"),
+)
 _EPOCH = 1e6  # s: stamps beyond count from 1970, not from the start
 
 
@@ -167,10 +172,12 @@ def reader_for(path: Path) -> Reader:
         There is no such file, or no reader for it.
     """
     require_stored(path)
-    for reader in READERS:
-        if reader.recognises(path):
+    for kind in READERS.foreign_first:
+        if (reader := kind()).recognises(path):
             return reader
-    known = "; ".join(f"{reader.title}: {', '.join(reader.suffixes)}" for reader in READERS)
+    known = "; ".join(
+        f"{title}: {', '.join(reader.suffixes)}" for title, reader in READERS.members.items()
+    )
     what = "is of no known format"
     if path.is_dir():
         what = "is a folder without a bag or a dataset of LeRobot"
