@@ -5,23 +5,24 @@ Each imports what it needs, and no more: names of formats need little mathematic
 
 
 def robot_names() -> list[str]:
-    """Short names of the robots of example-robot-data.
-
-    Raises
-    ------
-    RobotError
-        The package is not installed.
-    """
+    """Short names of the robots of example-robot-data; RobotError if that is not installed."""
     from excite_cli.robot.description import example_robots
 
     return list(example_robots())
 
 
-def effect_kinds() -> list[str]:
+def effects() -> list[str]:
     """Kinds of effects."""
     from excite_cli.effects.catalogue import EFFECTS
 
-    return list(EFFECTS.members)
+    return EFFECTS.names
+
+
+def motion_formats() -> list[str]:
+    """Formats of motions, as `excite export --format` takes them."""
+    from excite_cli.motion_formats.catalogue import MOTION_FORMATS
+
+    return MOTION_FORMATS.names
 
 
 def export_formats() -> list[str]:
@@ -31,22 +32,8 @@ def export_formats() -> list[str]:
     return [*motion_formats(), *MODEL_FORMATS]
 
 
-def motion_formats() -> list[str]:
-    """Names of the formats of motions."""
-    from excite_cli.motion_formats.catalogue import MOTION_FORMATS
-
-    return list(MOTION_FORMATS.members)
-
-
-def motion_titles() -> list[str]:
-    """What the formats of motions are called."""
-    from excite_cli.motion_formats.catalogue import MOTION_FORMATS
-
-    return [found.title for found in MOTION_FORMATS.members.values()]
-
-
-def reader_titles() -> list[str]:
+def readers() -> list[str]:
     """Formats of measured data."""
     from excite_cli.measurement.catalogue import READERS
 
-    return list(READERS.members)
+    return READERS.names

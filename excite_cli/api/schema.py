@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from excite_cli.api.arguments import checked
-from excite_cli.api.names import effect_kinds
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_text_atomically
 from excite_cli.config.spec import Spec
@@ -14,10 +13,11 @@ from excite_cli.shown.answer import Answer
 
 
 def schema_tree() -> dict[str, Any]:
-    """The schema, with the names of every family's members where a config names one."""
+    """The schema, with the names of a family's members where a text (`x-family`) is one of them."""
     from excite_cli.checks import rows
     from excite_cli.constraints.catalogue import own_constraints, settings_of
     from excite_cli.criteria.catalogue import CRITERIA
+    from excite_cli.effects.catalogue import EFFECTS
 
     own = {}
     for name, found in own_constraints().items():
@@ -25,9 +25,7 @@ def schema_tree() -> dict[str, Any]:
         keys = {each.name: {"type": "number"} for each in settings}
         needed = [each.name for each in settings if each.default is each.empty]
         own[name] = {"type": "object", "properties": keys, "required": needed}
-    names = {
-        "effects": effect_kinds(), "criteria": list(CRITERIA.members), "checks": list(rows.names()),
-    }  # fmt: skip
+    names = {"effects": EFFECTS.names, "criteria": CRITERIA.names, "checks": [*rows.names()]}
     whole = Spec.model_json_schema()
     for node in _nodes(whole):
         family = node.get("x-family")

@@ -30,14 +30,14 @@ class Log:
 
 
 class Check(ABC):
-    """One mistake: the `name` of its row, and its findings.
-
-    `of_description`: it looks at the robot alone, and also where there are no data.
-    """
+    """One mistake: the `name` of its row, and its findings."""
 
     name: ClassVar[str]
-    of_description: ClassVar[bool] = False
 
     @abstractmethod
     def look(self, log: Log) -> Iterable[CheckResult]:
         """A doubt or a fault for all that is wrong; nothing where all is fine."""
+
+
+class DescriptionCheck(Check):
+    """One that looks at the robot alone, and also where there are no data."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.checks.base import Check, Log
+from excite_cli.checks.base import DescriptionCheck, Log
 from excite_cli.checks.check_result import CheckResult, Status
 from excite_cli.robot.formats.urdf_parts import origin_of
 from excite_cli.robot.model import Array, Robot
@@ -77,11 +77,10 @@ def bodies_in_words(robot: Robot) -> str:
     return "; ".join(each.evidence for each in impossible_bodies(robot))
 
 
-class ImpossibleBodies(Check):
+class ImpossibleBodies(DescriptionCheck):
     """Masses and moments of inertia that no body has."""
 
     name = NAME
-    of_description = True
 
     def look(self, log: Log) -> list[CheckResult]:
         """Of every link."""

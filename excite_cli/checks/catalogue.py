@@ -1,60 +1,47 @@
 """All checks by the name of their row, in the order of the table of `excite inspect`."""
 
-from excite_cli.checks.base import Check
-from excite_cli.checks.bodies import ImpossibleBodies
-from excite_cli.checks.column_order import ColumnOrder
-from excite_cli.checks.gravity_direction import GravityDirection
-from excite_cli.checks.gravity_subtracted import GravitySubtracted
-from excite_cli.checks.joint_sign import PositionSign, TorqueSign
-from excite_cli.checks.joint_zero import JointZero
-from excite_cli.checks.position_unit import PositionUnit
+from excite_cli.checks.base import Check, DescriptionCheck
 from excite_cli.checks.setup_check import SetupCheck
-from excite_cli.checks.solids import MisfitSolids
-from excite_cli.checks.time_scale import Clock, TorqueLag
-from excite_cli.checks.tool import Tool
-from excite_cli.checks.torque_unit import TorqueUnit
-from excite_cli.checks.two_sides import UnequalHalves
-from excite_cli.checks.zero_limits import ZeroLimits
 from excite_cli.registry import Registry
 
 CHECKS: Registry[Check] = Registry(
     "check",
     "excite.checks",
     Check,
-    (
-        ImpossibleBodies,
-        MisfitSolids,
-        UnequalHalves,
-        ZeroLimits,
-        GravityDirection,
-        JointZero,
-        PositionSign,
-        TorqueSign,
-        ColumnOrder,
-        TorqueUnit,
-        PositionUnit,
-        GravitySubtracted,
-        Clock,
-        TorqueLag,
-        Tool,
-    ),
+    {
+        "bodies of the description": "bodies:ImpossibleBodies",
+        "masses and shapes of links": "solids:MisfitSolids",
+        "left-right symmetry": "two_sides:UnequalHalves",
+        "limits of the description": "zero_limits:ZeroLimits",
+        "direction of gravity": "gravity_direction:GravityDirection",
+        "zero of every joint": "joint_zero:JointZero",
+        "signs of positions": "joint_sign:PositionSign",
+        "signs of torques": "joint_sign:TorqueSign",
+        "order of columns": "column_order:ColumnOrder",
+        "unit of torques": "torque_unit:TorqueUnit",
+        "unit of positions": "position_unit:PositionUnit",
+        "gravity left in the torques": "gravity_subtracted:GravitySubtracted",
+        "clock": "time_scale:Clock",
+        "delay of torques": "time_scale:TorqueLag",
+        "tool or load": "tool:Tool",
+    },
 )
 
 
-def description_checks() -> list[Check]:
+def description_checks() -> list[DescriptionCheck]:
     """Those that look at the robot alone."""
-    return [found() for found in CHECKS.members.values() if found.of_description]
+    return [each for each in _every() if isinstance(each, DescriptionCheck)]
 
 
 def setup_checks() -> list[SetupCheck]:
     """Those whose mistakes are sought together."""
-    return [found() for found in CHECKS.members.values() if issubclass(found, SetupCheck)]
+    return [each for each in _every() if isinstance(each, SetupCheck)]
 
 
 def log_checks() -> list[Check]:
     """Those that look at the log by themselves."""
-    return [
-        found()
-        for found in CHECKS.members.values()
-        if not (found.of_description or issubclass(found, SetupCheck))
-    ]
+    return [each for each in _every() if not isinstance(each, DescriptionCheck | SetupCheck)]
+
+
+def _every() -> list[Check]:
+    return [found() for found in CHECKS.members.values()]

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from excite_cli.checks.base import Check, Log
+from excite_cli.checks.base import DescriptionCheck, Log
 from excite_cli.checks.bodies import LinkBody, link_bodies
 from excite_cli.checks.check_result import CheckResult, few
 from excite_cli.errors import RobotError
@@ -79,11 +79,10 @@ class _Solid:
         return float(np.sqrt(square) / np.linalg.norm((self.high - self.low) / 2))
 
 
-class MisfitSolids(Check):
+class MisfitSolids(DescriptionCheck):
     """Masses beside the shapes of their links."""
 
     name = NAME
-    of_description = True
 
     def look(self, log: Log) -> list[CheckResult]:
         """Of all links with both."""

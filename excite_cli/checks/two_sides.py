@@ -9,7 +9,7 @@ import re
 
 import numpy as np
 
-from excite_cli.checks.base import Check, Log
+from excite_cli.checks.base import DescriptionCheck, Log
 from excite_cli.checks.bodies import LinkBody, link_bodies
 from excite_cli.checks.check_result import CheckResult, few
 
@@ -24,11 +24,10 @@ _RIGHT = {"left": "right", "l": "r"}
 _RIGHT_LEG = {"fl": "fr", "rl": "rr", "hl": "hr", "bl": "br", "lf": "rf", "lh": "rh"}
 
 
-class UnequalHalves(Check):
+class UnequalHalves(DescriptionCheck):
     """Links of the left beside those of the right."""
 
     name = NAME
-    of_description = True
 
     def look(self, log: Log) -> list[CheckResult]:
         """One doubt for all pairs whose masses or inertias differ by more than half."""

@@ -9,18 +9,17 @@ import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 
-from excite_cli.checks.base import Check, Log
+from excite_cli.checks.base import DescriptionCheck, Log
 from excite_cli.checks.check_result import CheckResult, few
 
 NAME = "limits of the description"
 _WRITTEN = (".urdf", ".xacro")  # MJCF has no limits of speed, SDF may leave them out
 
 
-class ZeroLimits(Check):
+class ZeroLimits(DescriptionCheck):
     """Limits of 0 of joints that move."""
 
     name = NAME
-    of_description = True
 
     def look(self, log: Log) -> list[CheckResult]:
         """A doubt for speeds, and one for efforts, that the config does not give in their place."""

@@ -6,20 +6,22 @@ no offer: a Tab must neither wait nor print.
 
 from collections.abc import Callable
 
+from excite_cli.api import names
+
 
 def complete_format(incomplete: str) -> list[str]:
     """Formats of `excite export`."""
-    return _quietly(lambda: [name for name in _formats() if name.startswith(incomplete)])
+    return _named("export_formats", incomplete)
 
 
 def complete_robot(incomplete: str) -> list[str]:
     """Short names of the robots of example-robot-data."""
-    return _quietly(lambda: [name for name in _robots() if name.startswith(incomplete)])
+    return _named("robot_names", incomplete)
 
 
 def complete_effect(incomplete: str) -> list[str]:
     """`kind@` of every effect that can be planted."""
-    return _quietly(lambda: [f"{kind}@" for kind in _kinds() if kind.startswith(incomplete)])
+    return [f"{kind}@" for kind in _named("effects", incomplete)]
 
 
 def complete_key(incomplete: str) -> list[str]:
@@ -27,22 +29,10 @@ def complete_key(incomplete: str) -> list[str]:
     return _quietly(lambda: _keys(incomplete))
 
 
-def _robots() -> list[str]:
-    from excite_cli.api.names import robot_names
-
-    return robot_names()
-
-
-def _kinds() -> list[str]:
-    from excite_cli.api.names import effect_kinds
-
-    return effect_kinds()
-
-
-def _formats() -> list[str]:
-    from excite_cli.api.names import export_formats
-
-    return export_formats()
+def _named(family: str, incomplete: str) -> list[str]:
+    """Names of `api.names` that begin so."""
+    offer = getattr(names, family)
+    return _quietly(lambda: [name for name in offer() if name.startswith(incomplete)])
 
 
 def _words(key: str) -> tuple[list[str], list[str]]:
@@ -66,8 +56,8 @@ def _keys(incomplete: str) -> list[str]:
     if section is None:  # below a mapping whose keys are names, as those of constraints
         keys = _words(start[:-1])[0]
         return [f"{start}{name}" for name in keys if name.startswith(last)]
-    names = [name for name in section.model_fields if name.startswith(last)]
-    return [start + name + ("." if section.child(name, None) else "=") for name in names]
+    found = [name for name in section.model_fields if name.startswith(last)]
+    return [start + name + ("." if section.child(name, None) else "=") for name in found]
 
 
 def _quietly(offer: Callable[[], list[str]]) -> list[str]:

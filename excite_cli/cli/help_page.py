@@ -14,6 +14,7 @@ from typing import Any, get_args
 
 from typer.core import TyperCommand, TyperGroup
 
+from excite_cli.api import names as offered
 from excite_cli.cli.layout import copyable, wrapped
 
 # Groups of options are reported in this order; those of no group come first, as "Options".
@@ -21,7 +22,7 @@ WORK, OUTPUT, MESSAGES = "Workers", "Output files", "Messages"
 _LAST = (WORK, OUTPUT, MESSAGES)
 _INDENT, _FARTHER = 2, 6
 _NARROWEST, _WIDEST_NAMES = 50, 26
-_FAMILY = re.compile(r"\{(readers|motion titles|motion formats)\}")
+_FAMILY = re.compile(r"\{(readers|motion_formats)\}")
 _BOLD, _PLAIN = "\x1b[1m", "\x1b[0m"
 _METAVARS = {"path": "FILE", "int": "N", "float": "X", "text": "TEXT", "str": "TEXT"}
 
@@ -63,17 +64,7 @@ class HelpfulGroup(TyperGroup):
 
 def words_of(param: Any) -> str:
     """The help of an option or argument, with the members of a family where it has `{readers}`."""
-    return _FAMILY.sub(lambda found: ", ".join(_members(found[1])), str(param.help or ""))
-
-
-def _members(family: str) -> list[str]:
-    from excite_cli.api import names
-
-    members = {
-        "readers": names.reader_titles, "motion titles": names.motion_titles,
-        "motion formats": names.motion_formats,
-    }  # fmt: skip
-    return members[family]()
+    return _FAMILY.sub(lambda found: ", ".join(getattr(offered, found[1])()), str(param.help or ""))
 
 
 def usage_of(command: Any, ctx: Any) -> str:

@@ -49,7 +49,7 @@ HeldOut = Annotated[
 MotionFile = Annotated[
     Path,
     typer.Argument(
-        help="A result file, or a motion: {motion titles}.",
+        help="A result file, or a motion: {motion_formats}.",
         show_default=False,
     ),
 ]

@@ -12,7 +12,6 @@ from excite_cli.config.section import (
     Share,
     Vector3,
     kind_by,
-    name_in,
 )
 
 
@@ -191,7 +190,7 @@ class ConstraintsSpec(Section):
         default_factory=dict,
         description="constraints without a section here, as those of packages, by name, with "
         "their settings",
-        json_schema_extra=name_in("constraints"),
+        json_schema_extra={"x-family": "constraints"},
     )
 
     @field_validator("keep_out")

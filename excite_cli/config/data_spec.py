@@ -12,7 +12,6 @@ from excite_cli.config.section import (
     Positive,
     Section,
     Share,
-    name_in,
 )
 from excite_cli.config.wrench_spec import BaseStateSpec, WrenchSpec
 
@@ -67,8 +66,8 @@ def with_preset(values: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-EffectKind = Annotated[str, Field(json_schema_extra=name_in("effects"))]
-CheckName = Annotated[str, Field(json_schema_extra=name_in("checks"))]
+EffectKind = Annotated[str, Field(json_schema_extra={"x-family": "effects"})]
+CheckName = Annotated[str, Field(json_schema_extra={"x-family": "checks"})]
 RunStates = dict[EffectKind, str]  # `none`: without it
 
 

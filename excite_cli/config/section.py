@@ -51,14 +51,6 @@ Share = Annotated[float, Field(gt=0, le=1), _NO_TRUTH_VALUE]
 Vector3 = tuple[Finite, Finite, Finite]
 
 
-def name_in(family: str) -> dict[str, Any]:
-    """Marks, in the JSON Schema of a text, that it names a member of a family.
-
-    Which there are, packages decide: `excite schema` puts their names in its place.
-    """
-    return {"x-family": family}
-
-
 class Section(BaseModel):
     """Base of all sections: frozen, unknown keys refused."""
 

@@ -27,7 +27,6 @@ from excite_cli.config.section import (
     Power,
     Section,
     Share,
-    name_in,
 )
 from excite_cli.config.trajectory_spec import FourierSpec, SamplingSpec, TrajectorySpec
 from excite_cli.shown.record import Shown
@@ -108,7 +107,7 @@ class CriterionSpec(Section):
     kind: str = Field(
         "condition_number",
         description="function of the singular values; see docs/criteria.md",
-        json_schema_extra=name_in("criteria"),
+        json_schema_extra={"x-family": "criteria"},
     )
     smoothing: Power = Field(64.0, description="p of the smooth condition number")
     row_weights: Literal["none", "effort"] | dict[str, Positive] = Field(

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +34,6 @@ _ROUNDING = 1e-12
 class Constraint(Drawable, ABC):
     """Margins (T, m), one column per label; admissible where none is negative."""
 
-    key: ClassVar[str] = ""
-    """Its section under `constraints` of the YAML, if that is not its name."""
     name: str
     unit: str
     labels: tuple[str, ...]

@@ -2,17 +2,10 @@
 
 import inspect
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 from excite_cli.config.constraints_spec import ConstraintsSpec
-from excite_cli.constraints.balance import Balance
 from excite_cli.constraints.base import Constraint
-from excite_cli.constraints.ground_contact import GroundContact
-from excite_cli.constraints.joint_bound import JointBound
-from excite_cli.constraints.joint_torque import JointTorque
-from excite_cli.constraints.keep_out import KeepOut
-from excite_cli.constraints.obstacle_clearance import Surroundings
-from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.constraints.setting import Setting
 from excite_cli.constraints.standing import Standing
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
@@ -23,7 +16,7 @@ from excite_cli.robot.model import Robot
 _SECTIONS = frozenset(ConstraintsSpec.model_fields)
 
 
-def _flaw(found: type[Constraint], known: Mapping[str, type[Constraint]]) -> str:
+def _flaw(found: type[Constraint], known: Collection[str]) -> str:
     """What is wrong with the name of a constraint of a package; empty if nothing is."""
     return f"'{found.name}' is a key of `constraints`." if found.name in _SECTIONS else ""
 
@@ -32,9 +25,16 @@ CONSTRAINTS: Registry[Constraint] = Registry(
     "constraint",
     "excite.constraints",
     Constraint,
-    (JointBound, JointTorque, Balance, GroundContact, SelfCollision, Surroundings, KeepOut),
+    {
+        "joint_limits": "joint_bound:JointBound",
+        "torque": "joint_torque:JointTorque",
+        "balance": "balance:Balance",
+        "contact": "ground_contact:GroundContact",
+        "self_collision": "self_collision:SelfCollision",
+        "surroundings": "obstacle_clearance:Surroundings",
+        "keep_out": "keep_out:KeepOut",
+    },
     flaw_in=_flaw,
-    name_of=lambda found: found.key or found.name,
 )
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +33,6 @@ class JointBound(Constraint):
     `joints`, `signs`, `bounds` (m,): margin = bound − sign·x_joint. `scale` is half the range.
     """
 
-    key: ClassVar = "joint_limits"
     order: int
     joints: Indices
     signs: Array

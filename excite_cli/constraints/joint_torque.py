@@ -32,7 +32,6 @@ class JointTorque(Constraint):
     `uncertainty`: admitted inertias of the whole robot; None: those of the URDF.
     """
 
-    key = "torque"
     name = "joint_torque"
     of_forces = True
     title = "Joint torque left"

@@ -9,7 +9,6 @@ from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.constraints.drawing import ConstraintScene, NearestBodies
 from excite_cli.constraints.mesh_clearance import KEPT, MeshClearance
 from excite_cli.constraints.nearest_bodies import nearest_capsules
-from excite_cli.constraints.remark import counted_reasons
 from excite_cli.constraints.setting import Setting
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.geometry.coal_distances import CoalDistances
@@ -17,7 +16,7 @@ from excite_cli.geometry.collision_pairs import CollisionPairs, choose_pairs
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.geometry.pair_distances import PairDistances
 from excite_cli.geometry.pair_tables import mesh_tables, require_tabled
-from excite_cli.geometry.reasons import DroppedPair
+from excite_cli.geometry.reasons import DroppedPair, counted_reasons
 from excite_cli.proof.enclosed_distances import EnclosedCapsules
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.robot.capsule import Capsule

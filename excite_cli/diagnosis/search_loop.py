@@ -38,7 +38,7 @@ from excite_cli.diagnosis.weighted_fit import WeightedFit
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import scales
-from excite_cli.effects.seen import Seen
+from excite_cli.effects.judgement import Seen
 from excite_cli.identification.declared_states import LeftOut, declared_sets
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.prior import InertialPrior, as_wide_as_needed

@@ -18,12 +18,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
-from excite_cli.effects.abscissa import Abscissa as Abscissa
-from excite_cli.effects.abscissa import Quantity as Quantity
 from excite_cli.effects.judgement import Judgement
 from excite_cli.effects.judgement import Tier as Tier
 from excite_cli.effects.judgement import steps_by_ratio as steps_by_ratio
@@ -31,14 +29,27 @@ from excite_cli.effects.mechanism import Mechanism
 from excite_cli.effects.parameter import Parameter
 from excite_cli.effects.parameter import Value as Value
 from excite_cli.effects.parameter import deviation as deviation
-from excite_cli.effects.place import Place
+from excite_cli.effects.presentation import Abscissa as Abscissa
 from excite_cli.effects.presentation import Picture as Picture
 from excite_cli.effects.presentation import Presentation, Scope
+from excite_cli.effects.presentation import Quantity as Quantity
 from excite_cli.effects.signals import Cotangents, Signals
 
 if TYPE_CHECKING:
     from excite_cli.measurement.run_identity import RunId
     from excite_cli.robot.model import Array, Robot
+
+
+class Place(NamedTuple):
+    """Kind, joints, runs (empty: all) and the column of the log that is followed, if any.
+
+    What two effects that differ in their shape only have in common.
+    """
+
+    kind: str
+    joints: tuple[int, ...]
+    runs: tuple[str, ...] = ()
+    covariate: str = ""
 
 
 @dataclass(frozen=True)

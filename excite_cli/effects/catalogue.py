@@ -1,38 +1,15 @@
 """All effects by their kind, and those that a config or a description declares."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
 from excite_cli.config.data_spec import EffectSpec
-from excite_cli.effects.armature import Armature
-from excite_cli.effects.asymmetric_friction import AsymmetricFriction
-from excite_cli.effects.backlash import Backlash
 from excite_cli.effects.base import Effect
-from excite_cli.effects.base_tilt import BaseTilt
-from excite_cli.effects.cable_force import CableForce
-from excite_cli.effects.contact import Contact
 from excite_cli.effects.coulomb_friction import CoulombFriction
-from excite_cli.effects.coupled_friction import CoupledFriction
-from excite_cli.effects.covariate_friction import CovariateFriction
-from excite_cli.effects.covariate_offset import CovariateOffset
-from excite_cli.effects.dahl_friction import DahlFriction
-from excite_cli.effects.elasticity import Elasticity
-from excite_cli.effects.encoder_offset import EncoderOffset
-from excite_cli.effects.friction_change import FrictionChange
-from excite_cli.effects.friction_drift import FrictionDrift
-from excite_cli.effects.load_dependent_friction import LoadDependentFriction
-from excite_cli.effects.nonlinear_viscous_friction import NonlinearViscousFriction
 from excite_cli.effects.payload import Payload
 from excite_cli.effects.placing import ALL, places_named
-from excite_cli.effects.position_friction import PositionFriction
-from excite_cli.effects.ripple import Ripple
-from excite_cli.effects.spring import Spring
-from excite_cli.effects.stribeck_friction import StribeckFriction
-from excite_cli.effects.torque_delay import TorqueDelay
 from excite_cli.effects.torque_gain import TorqueGain
-from excite_cli.effects.torque_offset import TorqueOffset
-from excite_cli.effects.torque_saturation import TorqueSaturation
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.effects.wrench_gain import WrenchGain
 from excite_cli.errors import ConfigError, nearest
@@ -44,7 +21,7 @@ EVERYDAY_FRICTION = ("viscous_friction", "coulomb_friction")
 EVERYDAY = ("torque_offset", "armature")
 
 
-def _flaw(kind: type[Effect], kinds: Mapping[str, type[Effect]]) -> str:
+def _flaw(kind: type[Effect], kinds: Collection[str]) -> str:
     """What `kind` says of kinds that there are not; empty if it says nothing of such."""
     for trait in ("refines", "excludes", "same_as", "deviates_from", "changes_of"):
         for name in getattr(kind, trait):
@@ -57,36 +34,36 @@ EFFECTS: Registry[Effect] = Registry(
     "effect",
     "excite.effects",
     Effect,
-    (
-        ViscousFriction,
-        NonlinearViscousFriction,
-        CoulombFriction,
-        AsymmetricFriction,
-        StribeckFriction,
-        LoadDependentFriction,
-        PositionFriction,
-        DahlFriction,
-        FrictionDrift,
-        FrictionChange,
-        CovariateFriction,
-        CoupledFriction,
-        Armature,
-        Spring,
-        TorqueOffset,
-        CovariateOffset,
-        TorqueGain,
-        TorqueDelay,
-        WrenchGain,
-        TorqueSaturation,
-        Ripple,
-        CableForce,
-        Elasticity,
-        Backlash,
-        BaseTilt,
-        Payload,
-        EncoderOffset,
-        Contact,
-    ),
+    {
+        "viscous_friction": "viscous_friction:ViscousFriction",
+        "nonlinear_viscous_friction": "nonlinear_viscous_friction:NonlinearViscousFriction",
+        "coulomb_friction": "coulomb_friction:CoulombFriction",
+        "asymmetric_friction": "asymmetric_friction:AsymmetricFriction",
+        "stribeck_friction": "stribeck_friction:StribeckFriction",
+        "load_dependent_friction": "load_dependent_friction:LoadDependentFriction",
+        "position_friction": "position_friction:PositionFriction",
+        "dahl_friction": "dahl_friction:DahlFriction",
+        "friction_drift": "friction_drift:FrictionDrift",
+        "friction_change": "friction_change:FrictionChange",
+        "covariate_friction": "covariate_friction:CovariateFriction",
+        "coupled_friction": "coupled_friction:CoupledFriction",
+        "armature": "armature:Armature",
+        "spring": "spring:Spring",
+        "torque_offset": "torque_offset:TorqueOffset",
+        "covariate_offset": "covariate_offset:CovariateOffset",
+        "torque_gain": "torque_gain:TorqueGain",
+        "torque_delay": "torque_delay:TorqueDelay",
+        "wrench_gain": "wrench_gain:WrenchGain",
+        "torque_saturation": "torque_saturation:TorqueSaturation",
+        "ripple": "ripple:Ripple",
+        "cable_force": "cable_force:CableForce",
+        "elasticity": "elasticity:Elasticity",
+        "backlash": "backlash:Backlash",
+        "base_tilt": "base_tilt:BaseTilt",
+        "payload": "payload:Payload",
+        "encoder_offset": "encoder_offset:EncoderOffset",
+        "contact": "contact:Contact",
+    },
     ("kind", "title", "parameters"),
     _flaw,
 )

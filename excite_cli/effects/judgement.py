@@ -6,6 +6,7 @@ All have defaults, which suit most effects; a member says what is otherwise of i
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING, ClassVar
 
@@ -21,7 +22,6 @@ from excite_cli.effects.rare_sizes import (
 if TYPE_CHECKING:
     from excite_cli.effects.base import Effect
     from excite_cli.effects.parameter import Parameter
-    from excite_cli.effects.seen import Seen
     from excite_cli.effects.signals import Signals
     from excite_cli.robot.model import Array
 
@@ -35,6 +35,18 @@ class Tier(IntEnum):
     EVERY_ROBOT = 1
     MANY_ROBOTS = 2
     LAST = 3
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Of each moved joint (n,) [N·m]: the largest measured `torque`, and RMS of the rigid `load`.
+
+    `mass` of the robot [kg].
+    """
+
+    torque: Array
+    load: Array
+    mass: float
 
 
 class Judgement:

@@ -1,14 +1,11 @@
 """A parameter of an effect, and a value of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from excite_cli.robot.model import Array
+Array = NDArray[np.float64]
 
 
 Range = tuple[float, float]

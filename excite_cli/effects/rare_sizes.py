@@ -1,15 +1,11 @@
 """How far several fitted parameters may be off by chance: lengths and distances in their errors."""
 
-from __future__ import annotations
-
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from excite_cli.robot.model import Array
+Array = NDArray[np.float64]
 
 
 # Chance of a true effect to look impossible by the error of the fit, and be refused.

@@ -10,17 +10,12 @@ from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import ConfigError, FileError, nearest
 from excite_cli.given_files import require_stored
 from excite_cli.measurement.arrange import arrange, check_names, listed
-from excite_cli.measurement.bag_reader import BagReader
 from excite_cli.measurement.base_channel import channels_of_base
 from excite_cli.measurement.covariates import DeclaredCovariates
-from excite_cli.measurement.csv_reader import CsvReader
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
-from excite_cli.measurement.hdf5_reader import Hdf5Reader
 from excite_cli.measurement.joined_files import is_part, with_joined
-from excite_cli.measurement.mat_reader import MatReader
 from excite_cli.measurement.missing_values import known_stamps
 from excite_cli.measurement.motors import Motors
-from excite_cli.measurement.parquet_reader import ParquetReader
 from excite_cli.measurement.quality import checked
 from excite_cli.measurement.reader import SINCE_1970, RawRun, Reader, ReadOptions
 from excite_cli.measurement.recording_limits import RecordingLimits
@@ -35,7 +30,13 @@ READERS: Registry[Reader] = Registry(
     "reader",
     "excite.readers",
     Reader,
-    (Hdf5Reader, CsvReader, BagReader, MatReader, ParquetReader),
+    {
+        "HDF5": "hdf5_reader:Hdf5Reader",
+        "CSV": "csv_reader:CsvReader",
+        "ROS bag": "bag_reader:BagReader",
+        "MATLAB": "mat_reader:MatReader",
+        "parquet, also a LeRobot dataset's folder": "parquet_reader:ParquetReader",
+    },
     ("title", "suffixes"),
 )
 _EPOCH = 1e6  # s: stamps beyond count from 1970, not from the start

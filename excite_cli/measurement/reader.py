@@ -105,15 +105,7 @@ class Reader(ABC):
 
     @abstractmethod
     def read(self, path: Path, wanted: ReadOptions) -> list[RawRun]:
-        """All recordings of a file.
-
-        Raises
-        ------
-        FileError
-            The file is damaged, too large, or lacks what is needed.
-        MissingExtraError
-            The library for this format is not installed.
-        """
+        """All recordings of a file; FileError if it is damaged, too large, or lacks something."""
 
 
 def check_size(path: Path) -> None:

@@ -44,26 +44,10 @@ class MotionFormat(ABC):
 
     @abstractmethod
     def read(self, path: Path) -> TimedMotion:
-        """The file's motion, not yet checked.
-
-        Raises
-        ------
-        FileError
-            The file is damaged, too large, or lacks what is needed.
-        MissingExtraError
-            The library for this format is not installed.
-        """
+        """The file's motion, not yet checked; FileError if it is damaged or lacks something."""
 
     def write(self, path: Path, motion: TimedMotion) -> None:
-        """Write `motion` whole or not at all.
-
-        Raises
-        ------
-        FileError
-            The file cannot be written.
-        MissingExtraError
-            The library for this format is not installed.
-        """
+        """Write `motion` whole or not at all; FileError if that cannot be."""
         write_atomically(path, lambda temporary: self.fill(temporary, motion))
 
     @abstractmethod

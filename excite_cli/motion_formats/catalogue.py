@@ -5,11 +5,6 @@ from pathlib import Path
 from excite_cli.errors import FileError
 from excite_cli.given_files import require_stored
 from excite_cli.motion_formats.base import MotionFormat
-from excite_cli.motion_formats.csv_table import CsvTable
-from excite_cli.motion_formats.moveit_json import MoveitJson
-from excite_cli.motion_formats.npz_archive import NpzArchive
-from excite_cli.motion_formats.ros2_yaml import Ros2Yaml
-from excite_cli.motion_formats.rosbag2 import Mcap, Rosbag2
 from excite_cli.motion_formats.timed_motion import TimedMotion, arranged, checked
 from excite_cli.registry import Registry
 
@@ -17,19 +12,20 @@ MOTION_FORMATS: Registry[MotionFormat] = Registry(
     "motion format",
     "excite.motion_formats",
     MotionFormat,
-    (CsvTable, Ros2Yaml, Rosbag2, Mcap, MoveitJson, NpzArchive),
+    {
+        "csv": "csv_table:CsvTable",
+        "ros2": "ros2_yaml:Ros2Yaml",
+        "rosbag2": "rosbag2:Rosbag2",
+        "mcap": "rosbag2:Mcap",
+        "moveit": "moveit_json:MoveitJson",
+        "npz": "npz_archive:NpzArchive",
+    },
     ("name", "title", "suffixes"),
 )
 
 
 def motion_format_of(path: Path, measured: tuple[str, ...] = ("tau",)) -> MotionFormat | None:
-    """The format of a motion file; None for what is none, as data with columns `measured` ….
-
-    Raises
-    ------
-    FileError
-        There is no such file.
-    """
+    """The format of a motion file; None for what is none, as data with columns `measured` …."""
     require_stored(path)
     formats = (found() for found in MOTION_FORMATS.foreign_first)
     return next((each for each in formats if each.recognises(path, measured)), None)

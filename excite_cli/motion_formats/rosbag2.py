@@ -38,7 +38,7 @@ class Rosbag2(MotionFormat):
             return False
         try:
             check_bag(path)
-            with _opened(path) as reader:
+            with _library().Reader(path) as reader:
                 return any(connection.msgtype == MESSAGE for connection in reader.connections)
         except MissingExtraError:
             raise
@@ -53,7 +53,7 @@ class Rosbag2(MotionFormat):
         """The only message of that type."""
         check_bag(path)
         try:
-            with _opened(path) as reader:
+            with _library().Reader(path) as reader:
                 tree = _only_message(path, reader)
         except ExciteError:
             raise
@@ -131,10 +131,6 @@ def _library() -> Any:
             "ROS bags need the library rosbags: pip install 'excite-cli[bags]'"
         ) from error
     return rosbags.rosbag2
-
-
-def _opened(path: Path) -> Any:
-    return _library().Reader(path)
 
 
 def _only_message(path: Path, reader: Any) -> dict[str, Any]:

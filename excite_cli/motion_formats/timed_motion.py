@@ -48,13 +48,7 @@ class TimedMotion:
 
     @property
     def states(self) -> tuple[Array, Array, Array]:
-        """q, v, a (T, n) of a motion that has them all.
-
-        Raises
-        ------
-        FileError
-            Speeds or accelerations are not known.
-        """
+        """q, v, a (T, n) of a motion that has them all; FileError if it has not."""
         if self.v is None or self.a is None:
             raise FileError(
                 f"{self.name}: only a motion with speeds and accelerations is exported."

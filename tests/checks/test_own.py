@@ -18,6 +18,7 @@ from excite_cli.errors import ExciteWarning
 from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing
 from tests.effects import own_package
+from tests.registries import forget
 from tests.simulation.arms import arm, played
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "check.md"
@@ -31,9 +32,9 @@ def block(language: str) -> str:
 
 @pytest.fixture(autouse=True)
 def _read_anew() -> Iterator[None]:
-    CHECKS.forget()
+    forget(CHECKS)
     yield
-    CHECKS.forget()
+    forget(CHECKS)
 
 
 def install(folder: Path, code: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,6 +15,7 @@ from excite_cli.excitation.gradient_check import central_differences, relative_e
 from excite_cli.robot.model import Array
 from tests.effects import own_package
 from tests.effects.motions import signals_at, signals_of, states
+from tests.registries import forget
 from tests.robot.random_robots import random_robot
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -23,9 +24,9 @@ PAGE = (DOCS / "effects.md").read_text(encoding="utf-8")
 
 @pytest.fixture(autouse=True)
 def _catalogue_read_anew() -> Iterator[None]:
-    EFFECTS.forget()
+    forget(EFFECTS)
     yield
-    EFFECTS.forget()
+    forget(EFFECTS)
 
 
 @pytest.mark.parametrize("name", list(catalogue()))

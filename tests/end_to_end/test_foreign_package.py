@@ -95,7 +95,7 @@ def offered(cell: Installed, words: str) -> list[str]:
 def test_help_schema_and_completion_have_them(cell: Installed) -> None:
     assert "npz, waypoints of motions" in cell.good("export", "--help").stdout
     assert "log of the cell" in " ".join(cell.good("identify", "--help").stdout.split())
-    assert "way points of the cell" in " ".join(cell.good("check", "--help").stdout.split())
+    assert "waypoints" in " ".join(cell.good("check", "--help").stdout.split())
     schema = cell.good("schema").stdout
     assert [name for name in NAMES if f'"{name}"' not in schema] == []
     tree = json.loads(schema)["$defs"]
