@@ -35,7 +35,7 @@ READERS: Registry[Reader] = Registry(
         "CSV": "csv_reader:CsvReader",
         "ROS bag": "bag_reader:BagReader",
         "MATLAB": "mat_reader:MatReader",
-        "parquet, also a LeRobot dataset's folder": "parquet_reader:ParquetReader",
+        "parquet (also LeRobot folders)": "parquet_reader:ParquetReader",
     },
     ("title", "suffixes"),
 )
