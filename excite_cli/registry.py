@@ -72,9 +72,9 @@ class Registry(Generic[Member]):
         """All members; who knows a special case is asked first."""
         return [*self.foreign.values(), *(self.members[name] for name in self.own)]
 
-    def named(self, name: str, where: str, among: Sequence[str] = ()) -> type[Member]:
+    def named(self, name: str, where: str, among: Sequence[str] | None = None) -> type[Member]:
         """The member of that name, `among` all or these; ConfigError if there is none `where`."""
-        allowed = among or tuple(self.members)
+        allowed = list(self.members) if among is None else among
         if name in allowed:
             return self.members[name]
         advice = nearest(name, allowed)

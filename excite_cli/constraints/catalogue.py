@@ -65,7 +65,7 @@ def build_constraints(
     setting = Setting(spec, robot, uncertainty)
     found: list[Constraint] = []
     for key, member in CONSTRAINTS.members.items():
-        given = getattr(spec, key, None)
+        given = getattr(spec, key) if key in _SECTIONS else None
         if given is not None:
             found += member.build(given, setting)
     for name, numbers in spec.own.items():

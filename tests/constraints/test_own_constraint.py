@@ -89,6 +89,10 @@ def test_reports_and_views_show_it(kept: tuple[Problem, Result]) -> None:
     ("own", "words"),
     [
         ("{joint_powr: {limit: 3}}", "own.joint_powr: there is no .* Did you mean 'joint_power'"),
+        (
+            "{torque: {scale: 1}}",
+            "own.torque: there is no constraint 'torque'.* Known: joint_power",
+        ),
         ("{joint_power: {limits: 3}}", "own.joint_power: .*'limit'.* Settings: limit"),
         ("{joint_power: {}}", "own.joint_power: missing .*'limit'"),
     ],
@@ -96,3 +100,17 @@ def test_reports_and_views_show_it(kept: tuple[Problem, Result]) -> None:
 def test_wrong_names_are_told(own: str, words: str) -> None:
     with pytest.raises(ConfigError, match=words):
         _problem(f"constraints.own={own}")
+
+
+def test_without_any_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also not one with a section of its own."""
+    monkeypatch.delitem(CONSTRAINTS.members, "joint_power")
+    with pytest.raises(ConfigError, match=r"own\.torque: there is no constraint .* Known: none"):
+        _problem("constraints.own={torque: {scale: 1}}")
+
+
+def test_two_of_one_name_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Verdicts go by name: one would hide the other."""
+    monkeypatch.setattr(JointPower, "name", "joint_torque")
+    with pytest.raises(ConfigError, match="2 are called 'joint_torque'"):
+        _problem("constraints.own.joint_power.limit=3")
