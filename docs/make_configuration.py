@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from excite_cli.config.spec import Spec
+from excite_cli.api.schema import schema_tree
 
 TARGET = Path(__file__).parent / "configuration.md"
 HEAD = """# Every key of the YAML file
@@ -17,7 +17,13 @@ Made by `python -m docs.make_configuration` from the classes in `excite_cli/conf
 it up to date. `excite schema` prints the same as JSON Schema, from which editors complete. Unknown
 keys are errors; what is not *required* may be left out. Units are rad, s, N·m, kg and m.
 """
+_NOUNS = ("number", "integer", "text", "kind", "name")
 _MOST = 1e9  # beyond it any number is refused; not worth a word at every key
+# Families with too many members to list at every key.
+_FAMILIES = {
+    "effects": "kind ([effects](effects.md))",
+    "checks": "name (rows of `excite inspect`)",
+}
 _PLAIN = {
     "number": "number",
     "integer": "integer",
@@ -33,7 +39,7 @@ Place = tuple[str, Schema]
 
 def configuration() -> str:
     """The page as Markdown."""
-    whole = Spec.model_json_schema()
+    whole = schema_tree()
     places = dict(_places("", "", whole, whole["$defs"]))
     parts = [HEAD]
     for heading, schema in places.items():
@@ -70,6 +76,8 @@ def _words(field: Schema) -> str:
     """What may stand there."""
     if "const" in field:
         return f"`{field['const']}`"
+    if field.get("x-family") in _FAMILIES:
+        return _FAMILIES[field["x-family"]]
     if "enum" in field:
         return ", ".join(f"`{value}`" for value in field["enum"])
     if "anyOf" in field:
@@ -91,7 +99,7 @@ def _list_in_words(field: Schema) -> str:
 
 def _plural(words: str) -> str:
     noun, space, rest = words.partition(" ")
-    return f"{noun}s{space}{rest}" if noun in ("number", "integer", "text") else words
+    return f"{noun}s{space}{rest}" if noun in _NOUNS else words
 
 
 def _range(field: Schema) -> str:

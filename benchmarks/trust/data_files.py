@@ -29,8 +29,8 @@ from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import FileError
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Array, Dataset
-from excite_cli.measurement.motion_files import motion_reader_for, read_motion
 from excite_cli.measurement.quality import raise_for_errors
+from excite_cli.motion_formats.catalogue import motion_format_of, read_motion
 
 JOINTS = ("shoulder", "elbow", "wrist")
 _BOUNDS = (np.full(3, -3.0), np.full(3, 3.0), np.full(3, 4.0), np.full(3, 50.0))
@@ -69,7 +69,7 @@ def enter_data(path: Path) -> Dataset:
 
 def enter_motion(path: Path) -> bool:
     """As `check` and `view`: a motion, if the file is one."""
-    if motion_reader_for(path) is None:
+    if motion_format_of(path) is None:
         return False
     read_motion(path, JOINTS)
     return True

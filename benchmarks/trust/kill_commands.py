@@ -12,9 +12,8 @@ from PIL import Image
 
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.config.load_spec import load_spec
-from excite_cli.export.motions import MOTION_EXPORTERS
 from excite_cli.measurement.catalogue import read_dataset
-from excite_cli.measurement.motion_files import read_own_motion
+from excite_cli.motion_formats.catalogue import MOTION_FORMATS, read_own_motion
 from excite_cli.store.diagnosis_file import read_diagnosis
 from excite_cli.store.fit_file import read_fit
 from excite_cli.store.result_file import read_result
@@ -149,7 +148,7 @@ DIAGNOSIS = Command(
 
 
 def _export(kind: str) -> Command:
-    name = f"motion{MOTION_EXPORTERS[kind].suffix}"
+    name = f"motion{MOTION_FORMATS.members[kind]().suffix}"
     asked = words("export ../inputs/motions.h5 --motion 1 --rate 100", "--format", kind, "-o")
     return Command(f"export {kind}", (*asked, name), {name: _motion})
 

@@ -14,7 +14,7 @@ from excite_cli.campaign.records import Campaign, PlayedMotion
 from excite_cli.campaign.same_motion import compared
 from excite_cli.config.load_spec import parse_spec
 from excite_cli.errors import ExciteError, FileError, NoAdmissibleMotionError
-from excite_cli.measurement.motion_files import read_own_motion
+from excite_cli.motion_formats.catalogue import read_own_motion
 from excite_cli.shown.note import Level, Note, Tell
 from excite_cli.store.result_file import read_result
 from excite_cli.summary.pairs import doubts_in_words

@@ -17,7 +17,7 @@ from excite_cli.excitation.result import Result
 from excite_cli.excitation.time_scaling import PaceLimits, slowed_chain
 from excite_cli.export.own_samples import require_own_samples
 from excite_cli.export.timed import repeated
-from excite_cli.measurement.motion_files import read_own_motion
+from excite_cli.motion_formats.catalogue import read_own_motion
 from excite_cli.robot.model import build_robot
 from excite_cli.shown.answer import Command, as_word
 from excite_cli.shown.note import Level, Note, Tell

@@ -15,20 +15,17 @@ from excite_cli.claim import claim, leave
 from excite_cli.config.load_spec import files_of_config
 from excite_cli.errors import ConfigError, FileError, nearest
 from excite_cli.export.c_model import c_model
-from excite_cli.export.motion_exporter import MotionExporter
-from excite_cli.export.motion_rosbag2 import is_bag
-from excite_cli.export.motions import MOTION_EXPORTERS
+from excite_cli.export.model_formats import MODEL_FORMATS
 from excite_cli.export.timed import timed_motion
 from excite_cli.given_files import refuse_inputs_as_outputs
+from excite_cli.motion_formats.base import MotionFormat
+from excite_cli.motion_formats.catalogue import MOTION_FORMATS
 from excite_cli.shown.answer import Answer, Command, as_word
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.diagnosis_file import is_diagnosis
 from excite_cli.store.fit_file import is_fit, read_fit
 from excite_cli.store.model_file import is_text, read_model
 from excite_cli.store.thresholds_file import read_thresholds
-
-# Formats of identified models, and the suffixes of their files.
-MODELS = {"urdf": ".urdf", "mjcf": ".xml", "yaml": ".yaml", "c": ".c"}
 
 
 @dataclass(frozen=True)
@@ -82,9 +79,9 @@ def export_file(
     """Write motions for controllers, or a model for simulators or in C: `excite export`.
 
     `file` is a result, a motion in a controller's format, or a model (a fit, a diagnosis, a config
-    with its numbers). Formats of motions are `csv`, `ros2`, `rosbag2`, `mcap`, `moveit`, `npz`, of
-    models `urdf`, `mjcf`, `c`, and of fits `yaml`. `output` is by default named after `file`;
-    several motions get their numbers before the suffix.
+    with its numbers). Formats of motions are `csv`, `ros2`, `rosbag2`, `mcap`, `moveit`, `npz` and
+    those of packages, of models `urdf`, `mjcf`, `c`, and of fits `yaml`. `output` is by default
+    named after `file`; several motions get their numbers before the suffix.
 
     Motions (`chosen` of a result's by their index) are sampled at `rate` [Hz], exact at every
     instant [s, rad, rad/s, rad/s²; m for sliding joints]; `equidistant` stretches the step so that
@@ -107,7 +104,7 @@ def export_file(
     NoAdmissibleMotionError
         No admissible way from `start` into a motion was found.
     """
-    formats = [*MOTION_EXPORTERS, *MODELS]
+    formats = [*MOTION_FORMATS.members, *MODEL_FORMATS]
     if format not in formats:
         raise ConfigError(
             f"--format {format}: unknown.{nearest(format, formats)} Known: {', '.join(formats)}."
@@ -118,17 +115,17 @@ def export_file(
         raise ConfigError(f"--periods {periods}: a motion is played once or more.")
     path, target = existing(file), Path(output) if output is not None else None
     modelled = is_fit(path) or is_diagnosis(path)
-    if modelled != (format in MODELS) and not (format in MODELS and is_text(path)):
-        what, own = ("a model", MODELS) if modelled else ("no model", MOTION_EXPORTERS)
+    if modelled != (format in MODEL_FORMATS) and not (format in MODEL_FORMATS and is_text(path)):
+        what, own = ("a model", MODEL_FORMATS) if modelled else ("no model", MOTION_FORMATS.members)
         raise FileError(
             f"{path} is {what}: it cannot be exported as {format}. Its formats: {', '.join(own)}."
         )
     if thresholds is not None and format != "c":
         raise ConfigError(f"--thresholds: only a model in C holds them, not {format}.")
-    if format in MODELS:
+    if format in MODEL_FORMATS:
         limits = None if thresholds is None else existing(thresholds)
         return _export_model(path, format, target, limits, overwrite, tell)
-    exporter = MOTION_EXPORTERS[format]
+    exporter = MOTION_FORMATS.members[format]()
     chains = chains_of(path, ChainRequest(chosen, periods, slow, start, allow_unproved), tell)
     paths = _paths(path, target, exporter, [each.name for each in chains])
     refuse_inputs_as_outputs({f"--output ({to})": to for to in paths}, (path,))
@@ -174,7 +171,7 @@ def export_answer(found: Exported) -> Answer:
 
 
 def _written(
-    each: ExportedChain, path: Path, exporter: MotionExporter, rate: float, equidistant: bool
+    each: ExportedChain, path: Path, exporter: MotionFormat, rate: float, equidistant: bool
 ) -> ExportedMotion:
     timed = timed_motion(
         each.name, each.joint_names, each.chain, rate, equidistant, exporter.whole_nanoseconds
@@ -191,9 +188,7 @@ def _written(
     )
 
 
-def _paths(
-    file: Path, output: Path | None, exporter: MotionExporter, names: list[str]
-) -> list[Path]:
+def _paths(file: Path, output: Path | None, exporter: MotionFormat, names: list[str]) -> list[Path]:
     """Where each motion goes; several get their numbers before the suffix."""
     base = output or Path(f"{file.stem}_{names[0]}{exporter.suffix}")
     if output is None and len(names) > 1:
@@ -205,7 +200,7 @@ def _paths(
 
 
 @contextmanager
-def _held(paths: list[Path], exporter: MotionExporter, overwrite: bool) -> Iterator[None]:
+def _held(paths: list[Path], exporter: MotionFormat, overwrite: bool) -> Iterator[None]:
     """As `held`; a folder is replaced only by what is of its kind."""
     if not exporter.folder:
         with held({f"output ({path})": path for path in paths}, overwrite):
@@ -215,8 +210,9 @@ def _held(paths: list[Path], exporter: MotionExporter, overwrite: bool) -> Itera
         for path in paths:
             claim(path)
             claims.callback(leave, path)
-            if path.exists() and not (overwrite and is_bag(path)):
-                replace = ", or replace it with --overwrite" if is_bag(path) else ""
+            replaceable = exporter.may_replace(path)
+            if path.exists() and not (overwrite and replaceable):
+                replace = ", or replace it with --overwrite" if replaceable else ""
                 raise FileError(f"{path} exists already. Give another name{replace}.")
         yield
 
@@ -234,7 +230,7 @@ def _export_model(
     URDF and MJCF hold physically consistent bodies, and straight friction where they have no form
     for what was found; C is the model that the table of errors belongs to.
     """
-    path = output or Path(f"{file.stem}{MODELS[format]}")
+    path = output or Path(f"{file.stem}{MODEL_FORMATS[format]}")
     with held({"output": path}, overwrite, (file, *paths_in(thresholds))):
         stored = read_model(file)
         config = file if stored.what in ("config", "urdf") else None

@@ -10,7 +10,7 @@ from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.base_channel import channels_of_base
 from excite_cli.measurement.dataset import Dataset
-from excite_cli.measurement.motion_files import motion_reader_for, read_motion
+from excite_cli.motion_formats.catalogue import motion_format_of, read_motion
 from excite_cli.robot.model import Array, Robot
 from excite_cli.shown.note import Level, Note, Tell
 from excite_cli.trajectory.fade import Segment
@@ -33,7 +33,7 @@ def is_motion(path: Path, spec: Spec | None = None) -> bool:
         measured = [spec.measurement.channels.get("tau") or "tau"]
         if "base" in spec.robot.rows:
             measured += [channel.name for channel in channels_of_base(spec.measurement)]
-    return motion_reader_for(path, tuple(measured)) is not None
+    return motion_format_of(path, tuple(measured)) is not None
 
 
 def read_segment(path: Path, robot: Robot, tell: Tell) -> Segment:

@@ -90,7 +90,7 @@ def inspect(
     page = None if output is None else page_path(output)
     with held({"apply": apply, "output": page}, overwrite, inputs_of(problem, *files)):
         check_names(case.spec, rows.names())
-        found = but_trusted(rows.of_description(case.robot), case.spec)
+        found = but_trusted(rows.of_description(case.robot, case.spec), case.spec)
         settings: dict[str, Any] = {}
         before, more = settings, settings
         runs: tuple[str, ...] = ()

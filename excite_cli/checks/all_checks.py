@@ -8,10 +8,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from excite_cli.checks import foreign_runs, rows, sentences, standing_legs
+from excite_cli.checks.base import Log
+from excite_cli.checks.catalogue import log_checks, setup_checks
 from excite_cli.checks.check_result import CheckResult
-from excite_cli.checks.own import Log, own_checks
 from excite_cli.checks.samples import samples_of
-from excite_cli.checks.set_up_search import CHECKS, mistakes
+from excite_cli.checks.set_up_search import mistakes
 from excite_cli.checks.setup import Setup
 from excite_cli.checks.textbook_fit import TextbookFit
 from excite_cli.checks.trust import but_trusted, is_trusted
@@ -54,14 +55,17 @@ def _look(
     rest = [run for run in prepared if run.run.name not in {each.runs for each in foreign}]
     if foreign and rest and len(rest) < len(prepared):  # what is wrong of the others
         return [*foreign, *_look(robot, runs, rest, spec)]
-    own = [each for check in own_checks() for each in check.look(Log(robot, runs, prepared, spec))]
+    log = Log(robot, runs, prepared, spec)
+    own = [each for check in log_checks() for each in check.look(log)]
     weightless = any(step.check.kind == "no_gravity" for step in steps)
     if not (weightless or is_trusted(standing_legs.NAME, spec)):
         standing = standing_legs.standing_legs(robot, samples.thinned(_FEW))
         if standing:
             return [*standing, *own]
     left = TextbookFit(robot, samples, loose=_ANY)(setup)
-    said_already = [any(check.is_declared(name, spec) for check in CHECKS) for name in names]
+    said_already = [
+        any(check.is_declared(name, spec) for check in setup_checks()) for name in names
+    ]
     unexplained = sentences.unexplained(left, names, said_already)
     if any(each.status == "fault" for each in unexplained):  # then steps have led nowhere
         return [*unexplained, *own]

@@ -1,79 +1,43 @@
-"""A family of mistakes that people make of one thing: which set-ups may be meant instead."""
+"""What a check of `excite inspect` is: it looks at log and model, and says what is wrong."""
+
+from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
-from excite_cli.checks.setup import Setup
-from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
-from excite_cli.checks.trust import key_of
-from excite_cli.config.spec import Spec
-
-Settings = dict[str, Any]  # by the path of the key in the config
+if TYPE_CHECKING:
+    from excite_cli.checks.check_result import CheckResult
+    from excite_cli.config.spec import Spec
+    from excite_cli.identification.prepare import PreparedRun
+    from excite_cli.measurement.dataset import Run
+    from excite_cli.robot.model import Robot
 
 
 @dataclass(frozen=True)
-class Alternative:
-    """Another set-up; the `joints` whose set-up it changes, none where it is that of all.
+class Log:
+    """What a check looks at: `runs` as recorded, `prepared` ones (filtered), the config `spec`.
 
-    `is_plain`: a round value, which is meant where it explains as much as any near it. Of what has
-    the same joints and `variant` one is told. `price`, in L, of what hardly anybody does.
+    Units are rad, rad/s, rad/s², N·m (m, N of slides), columns in the order of `robot.joint_names`.
+    Without data there are no runs.
     """
 
-    setup: Setup
-    joints: tuple[int, ...] = ()
-    variant: str = ""
-    price: float = 0.0
-    is_plain: bool = False
+    robot: Robot
+    runs: Sequence[Run]
+    prepared: Sequence[PreparedRun]
+    spec: Spec
 
 
-def descended(
-    fit: TextbookFit, setup: Setup, steps: Iterable[float], moved: Callable[[Setup, float], Setup]
-) -> tuple[Setup, float]:
-    """The set-up with the least L, one step after the other to either side, and L."""
-    loss = fit(setup).loss
-    for step in steps:
-        for tried in (moved(setup, -step), moved(setup, step)):
-            if (now := fit(tried).loss) < loss:
-                loss, setup = now, tried
-    return setup, loss
-
-
-class SetupCheck(ABC):
-    """One thing that may be set up wrongly."""
+class Check(ABC):
+    """One mistake: the `name` of its row, and its findings."""
 
     name: ClassVar[str]
-    kind: ClassVar[str]  # of its findings
-    of_all: ClassVar[bool] = False  # whether what it is about shows on every joint
-    is_physical: ClassVar[bool] = False  # whether it is no mistake, and so never a fault
 
     @abstractmethod
-    def alternatives(
-        self, fit: TextbookFit, setup: Setup, explained: TextbookShares
-    ) -> Iterator[Alternative]:
-        """What may be meant instead of a set-up."""
+    def look(self, log: Log) -> Iterable[CheckResult]:
+        """A doubt or a fault for all that is wrong; nothing where all is fine."""
 
-    def refined(self, fit: TextbookFit, found: Alternative) -> Iterator[Alternative]:
-        """The alternative that explains most near the one that was found, and a plain one."""
-        yield found
 
-    @abstractmethod
-    def sentence(self, names: Sequence[str], before: Setup, after: Setup) -> str:
-        """What is wrong."""
-
-    @abstractmethod
-    def settings(self, names: Sequence[str], spec: Spec, before: Setup, after: Setup) -> Settings:
-        """What to write in the config; nothing where no key says it."""
-
-    def has_effect(self, before: Setup, after: Setup) -> bool:
-        """Whether an effect of the model says the same as this mistake."""
-        return self.is_physical
-
-    def trusted(self, names: Sequence[str], spec: Spec, joints: Sequence[int]) -> Settings:
-        """What to write where the data are right as they are."""
-        return key_of(self.name)
-
-    def is_declared(self, name: str, spec: Spec) -> bool:
-        """Whether the config says already how joint `name` is set up."""
-        return False
+class DescriptionCheck(Check):
+    """One that looks at the robot alone, and also where there are no data."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from excite_cli.checks.base import DescriptionCheck, Log
 from excite_cli.checks.check_result import CheckResult, Status
 from excite_cli.robot.formats.urdf_parts import origin_of
 from excite_cli.robot.model import Array, Robot
@@ -74,6 +75,16 @@ _SHORTEST = 0.15  # m, of a link that carries no joint
 def bodies_in_words(robot: Robot) -> str:
     """What to know of the description's bodies, in one sentence; empty where all can be."""
     return "; ".join(each.evidence for each in impossible_bodies(robot))
+
+
+class ImpossibleBodies(DescriptionCheck):
+    """Masses and moments of inertia that no body has."""
+
+    name = NAME
+
+    def look(self, log: Log) -> list[CheckResult]:
+        """Of every link."""
+        return impossible_bodies(log.robot)
 
 
 def impossible_bodies(robot: Robot) -> list[CheckResult]:

@@ -5,8 +5,8 @@ from itertools import combinations
 
 import numpy as np
 
-from excite_cli.checks.base import Alternative, Settings, SetupCheck
 from excite_cli.checks.setup import Order, Setup
+from excite_cli.checks.setup_check import Alternative, Settings, SetupCheck
 from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
 from excite_cli.config.spec import Spec
 

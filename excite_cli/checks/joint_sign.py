@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from excite_cli.checks.base import Alternative, Settings, SetupCheck
 from excite_cli.checks.joint_zero import offsets
 from excite_cli.checks.setup import Setup
+from excite_cli.checks.setup_check import Alternative, Settings, SetupCheck
 from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
 from excite_cli.config.spec import Spec
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from excite_cli.checks.base import Alternative, Settings, SetupCheck
 from excite_cli.checks.setup import Setup
+from excite_cli.checks.setup_check import Alternative, Settings, SetupCheck
 from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
 from excite_cli.config.spec import Spec
 from excite_cli.measurement.torque import RADIANS, angle_units

@@ -2,18 +2,10 @@
 
 from collections.abc import Sequence
 
-from excite_cli.checks import (
-    bodies,
-    foreign_runs,
-    sentences,
-    solids,
-    standing_legs,
-    two_sides,
-    zero_limits,
-)
+from excite_cli.checks import foreign_runs, sentences, standing_legs
+from excite_cli.checks.base import Log
+from excite_cli.checks.catalogue import description_checks, log_checks, setup_checks
 from excite_cli.checks.check_result import CheckResult, Status
-from excite_cli.checks.own import own_checks
-from excite_cli.checks.set_up_search import CHECKS
 from excite_cli.checks.trust import but_trusted, is_trusted
 from excite_cli.config.spec import Spec
 from excite_cli.measurement.dataset import Finding
@@ -34,25 +26,16 @@ _OF_FILES: dict[str, tuple[str, ...]] = {
     "units of positions and time": ("units", "gain", "lag"),
     "limits of the joints": ("outside_limits", "torque_units"),
 }  # fmt: skip
-_OF_DESCRIPTION = (bodies.NAME, solids.NAME, two_sides.NAME, zero_limits.NAME)
-NAMES = (
-    *_OF_DESCRIPTION, *_OF_FILES, foreign_runs.NAME, standing_legs.NAME,
-    *(check.name for check in CHECKS), sentences.BELONG,
-)  # fmt: skip
 _OTHER = "what else was noticed"
 _TRUSTED = "not judged: measurement.trust names it"
 _SPEEDS = "measurement.channels"  # leaves recorded speeds out, which no fit needs
 _STATUS: dict[str, Status] = {"error": "fault", "warning": "doubt", "note": "ok"}
 
 
-def of_description(robot: Robot) -> list[CheckResult]:
+def of_description(robot: Robot, spec: Spec) -> list[CheckResult]:
     """Doubts and faults of the description alone."""
-    return [
-        *bodies.impossible_bodies(robot),
-        *solids.misfit_solids(robot),
-        *two_sides.unequal_halves(robot),
-        *zero_limits.zero_limits(robot),
-    ]
+    log = Log(robot, (), (), spec)
+    return [each for check in description_checks() for each in check.look(log)]
 
 
 def of_files(findings: Sequence[Finding], spec: Spec) -> list[CheckResult]:
@@ -61,7 +44,7 @@ def of_files(findings: Sequence[Finding], spec: Spec) -> list[CheckResult]:
     A doubt that asks for another config is open. A fault has a key of its own.
     """
     row = {kind: name for name, kinds in _OF_FILES.items() for kind in kinds}
-    row |= {check.kind: check.name for check in CHECKS}
+    row |= {check.kind: check.name for check in setup_checks()}
     found = [
         CheckResult(
             row.get(each.kind, _OTHER), each.kind, _STATUS[each.severity], each.text, each.joints,
@@ -76,16 +59,20 @@ def of_files(findings: Sequence[Finding], spec: Spec) -> list[CheckResult]:
 
 def names() -> tuple[str, ...]:
     """Of all checks, those of packages among them."""
-    return (*NAMES, *(check.name for check in own_checks()))
+    groups = (description_checks(), setup_checks(), log_checks())
+    first, sought, others = ([check.name for check in group] for group in groups)
+    stages = (*_OF_FILES, foreign_runs.NAME, standing_legs.NAME)
+    return tuple(dict.fromkeys((*first, *stages, *sought, sentences.BELONG, *others)))
 
 
 def in_order(found: Sequence[CheckResult], judged: bool, spec: Spec) -> tuple[CheckResult, ...]:
     """Results by the order of rows; a row without any is fine, if it was `judged` or trusted."""
     rows: list[CheckResult] = []
-    seen = {*_OF_DESCRIPTION, *_OF_FILES}  # trusted or not
+    described = {check.name for check in description_checks()}
+    seen = {*described, *_OF_FILES}  # trusted or not
     for name in (*names(), _OTHER):
         own = [each for each in found if each.name == name]
-        if not own and (judged or name in _OF_DESCRIPTION) and name != _OTHER:
+        if not own and (judged or name in described) and name != _OTHER:
             is_judged = name in seen or not is_trusted(name, spec)
             own = [CheckResult(name, "", "ok", "" if is_judged else _TRUSTED)]
         rows += own

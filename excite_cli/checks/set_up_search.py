@@ -11,19 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.checks.base import Alternative, SetupCheck
-from excite_cli.checks.column_order import ColumnOrder
-from excite_cli.checks.gravity_direction import GravityDirection
-from excite_cli.checks.gravity_subtracted import GravitySubtracted
-from excite_cli.checks.joint_sign import PositionSign, TorqueSign
-from excite_cli.checks.joint_zero import JointZero
-from excite_cli.checks.position_unit import PositionUnit
+from excite_cli.checks.catalogue import setup_checks
 from excite_cli.checks.samples import Samples
 from excite_cli.checks.setup import Setup
+from excite_cli.checks.setup_check import Alternative, SetupCheck
 from excite_cli.checks.textbook_fit import FLOOR, TextbookFit, TextbookShares
-from excite_cli.checks.time_scale import Clock, TorqueLag
-from excite_cli.checks.tool import Tool
-from excite_cli.checks.torque_unit import TorqueUnit
 from excite_cli.checks.trust import is_trusted
 from excite_cli.config.spec import Spec
 from excite_cli.measurement.dataset import Mask
@@ -51,10 +43,6 @@ def beyond_limits(robot: Robot, samples: Samples, setup: Setup) -> Mask:
     return ~(within.any(axis=0) | ~np.isfinite(upper - lower))
 
 
-CHECKS: tuple[SetupCheck, ...] = (
-    GravityDirection(), JointZero(), PositionSign(), TorqueSign(), ColumnOrder(), TorqueUnit(),
-    PositionUnit(), GravitySubtracted(), Clock(), TorqueLag(), Tool(),
-)  # fmt: skip
 # What an alternative must gain in L; and in the logarithm of the share of some joint, which falls
 # to 0.7 of what it was (all a little better is what effects do), unless it is the bodies that are
 # bent less. Of what shows on all joints a third must gain, too.
@@ -197,7 +185,7 @@ def _candidates(
     fit: TextbookFit, rough: TextbookFit, spec: Spec, setup: Setup, explained: TextbookShares
 ) -> Iterator[_Candidate]:
     names, beyond = fit.robot.joint_names, beyond_limits(fit.robot, rough.samples, setup)
-    for check in CHECKS:
+    for check in setup_checks():
         if is_trusted(check.name, spec):
             continue
         settled = {j for j, name in enumerate(names) if check.is_declared(name, spec)}

@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
+from excite_cli.checks.base import DescriptionCheck, Log
 from excite_cli.checks.bodies import LinkBody, link_bodies
 from excite_cli.checks.check_result import CheckResult, few
 from excite_cli.errors import RobotError
@@ -76,6 +77,16 @@ class _Solid:
         off = self.body.centre - (self.low + self.high) / 2
         square = max(float(np.trace(self.body.spread)), 0.0) + float(off @ off)
         return float(np.sqrt(square) / np.linalg.norm((self.high - self.low) / 2))
+
+
+class MisfitSolids(DescriptionCheck):
+    """Masses beside the shapes of their links."""
+
+    name = NAME
+
+    def look(self, log: Log) -> list[CheckResult]:
+        """Of all links with both."""
+        return misfit_solids(log.robot)
 
 
 def misfit_solids(robot: Robot) -> list[CheckResult]:

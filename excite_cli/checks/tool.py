@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from excite_cli.checks.base import Alternative, Settings, SetupCheck
 from excite_cli.checks.setup import Setup
+from excite_cli.checks.setup_check import Alternative, Settings, SetupCheck
 from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
 from excite_cli.config.spec import Spec
 

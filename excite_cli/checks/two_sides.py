@@ -9,9 +9,9 @@ import re
 
 import numpy as np
 
+from excite_cli.checks.base import DescriptionCheck, Log
 from excite_cli.checks.bodies import LinkBody, link_bodies
 from excite_cli.checks.check_result import CheckResult, few
-from excite_cli.robot.model import Robot
 
 NAME = "left-right symmetry"
 # Of 1,571 pairs of 106 descriptions 25 masses differ by more than 2 %, 37 inertias by this.
@@ -24,22 +24,28 @@ _RIGHT = {"left": "right", "l": "r"}
 _RIGHT_LEG = {"fl": "fr", "rl": "rr", "hl": "hr", "bl": "br", "lf": "rf", "lh": "rh"}
 
 
-def unequal_halves(robot: Robot) -> list[CheckResult]:
-    """One doubt for all pairs whose masses or inertias differ by more than half."""
-    bodies = {body.name: body for body in link_bodies(robot)}
-    least = _COUNTS * sum(body.mass for body in bodies.values())
-    told = []
-    for left in bodies.values():
-        right = next((bodies[name] for name in _mirrored(left.name) if name in bodies), None)
-        if right is not None and max(left.mass, right.mass) > least:
-            told += _differences(left, right)
-    if not told:
-        return []
-    text = (
-        f"{few(told, '; ')}. Which side is right? Correct the other in the description, if the "
-        "robot's two sides are alike"
-    )
-    return [CheckResult(NAME, "unequal_halves", "doubt", text)]
+class UnequalHalves(DescriptionCheck):
+    """Links of the left beside those of the right."""
+
+    name = NAME
+
+    def look(self, log: Log) -> list[CheckResult]:
+        """One doubt for all pairs whose masses or inertias differ by more than half."""
+        robot = log.robot
+        bodies = {body.name: body for body in link_bodies(robot)}
+        least = _COUNTS * sum(body.mass for body in bodies.values())
+        told = []
+        for left in bodies.values():
+            right = next((bodies[name] for name in _mirrored(left.name) if name in bodies), None)
+            if right is not None and max(left.mass, right.mass) > least:
+                told += _differences(left, right)
+        if not told:
+            return []
+        text = (
+            f"{few(told, '; ')}. Which side is right? Correct the other in the description, if the "
+            "robot's two sides are alike"
+        )
+        return [CheckResult(NAME, "unequal_halves", "doubt", text)]
 
 
 def _mirrored(name: str) -> list[str]:

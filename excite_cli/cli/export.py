@@ -24,8 +24,7 @@ def export(
             "--format",
             "-f",
             metavar="FORMAT",
-            help="csv, ros2, rosbag2, mcap, moveit, npz of motions; urdf, mjcf, c of models; yaml "
-            "of fits.",
+            help="{motion_formats} of motions; urdf, mjcf, c of models; yaml of fits.",
             autocompletion=complete_format,
         ),
     ],

@@ -14,6 +14,7 @@ from typing import Any, get_args
 
 from typer.core import TyperCommand, TyperGroup
 
+from excite_cli.api import names as offered
 from excite_cli.cli.layout import copyable, wrapped
 
 # Groups of options are reported in this order; those of no group come first, as "Options".
@@ -21,6 +22,7 @@ WORK, OUTPUT, MESSAGES = "Workers", "Output files", "Messages"
 _LAST = (WORK, OUTPUT, MESSAGES)
 _INDENT, _FARTHER = 2, 6
 _NARROWEST, _WIDEST_NAMES = 50, 26
+_FAMILY = re.compile(r"\{(readers|motion_formats)\}")
 _BOLD, _PLAIN = "\x1b[1m", "\x1b[0m"
 _METAVARS = {"path": "FILE", "int": "N", "float": "X", "text": "TEXT", "str": "TEXT"}
 
@@ -44,6 +46,13 @@ class HelpfulCommand(TyperCommand):
         """Write the page."""
         write_page(self, ctx, formatter)
 
+    def shell_complete(self, ctx: Any, incomplete: str) -> Any:
+        """Options, each with its words."""
+        for param in self.get_params(ctx):
+            if param.param_type_name == "option":
+                param.help = words_of(param)  # type: ignore[attr-defined]
+        return super().shell_complete(ctx, incomplete)
+
 
 class HelpfulGroup(TyperGroup):
     """The program itself: its commands in groups."""
@@ -51,6 +60,11 @@ class HelpfulGroup(TyperGroup):
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the page."""
         write_page(self, ctx, formatter)
+
+
+def words_of(param: Any) -> str:
+    """The help of an option or argument, with the members of a family where it has `{readers}`."""
+    return _FAMILY.sub(lambda found: ", ".join(getattr(offered, found[1])()), str(param.help or ""))
 
 
 def usage_of(command: Any, ctx: Any) -> str:
@@ -94,7 +108,7 @@ def sections_of(command: Any, ctx: Any) -> dict[str, list[tuple[str, str]]]:
         if getattr(param, "hidden", False):
             continue
         if param.param_type_name == "argument":
-            row = (_argument(param), param.help or "")
+            row = (_argument(param), words_of(param))
             found.setdefault("Arguments", []).append(row)
         else:
             own = getattr(param, "rich_help_panel", None) or "Options"
@@ -117,7 +131,7 @@ def _option(param: Any, ctx: Any) -> tuple[str, str]:
         names += f" / {', '.join(param.secondary_opts)}"
     if not param.is_flag:
         names += f" {_metavar(param, ctx)}"
-    words = str(param.help or "").rstrip()
+    words = words_of(param).rstrip()
     default = param.default
     if param.required:
         words += " Must be given."

@@ -40,7 +40,7 @@ def start_from(text: str | None, entry: bool) -> dict[str, float] | None:
 Config = Annotated[Path, typer.Argument(help="The problem, a YAML file.", show_default=False)]
 Data = Annotated[
     list[Path],
-    typer.Argument(help="Measured data: HDF5, CSV, MATLAB, parquet, bags.", show_default=False),
+    typer.Argument(help="Measured data: {readers}.", show_default=False),
 ]
 HeldOut = Annotated[
     str | None,
@@ -49,7 +49,7 @@ HeldOut = Annotated[
 MotionFile = Annotated[
     Path,
     typer.Argument(
-        help="A result file, or a motion: CSV, .npz, ROS 2 YAML, MoveIt JSON, rosbag2.",
+        help="A result file, or a motion: {motion_formats}.",
         show_default=False,
     ),
 ]

@@ -188,7 +188,9 @@ class ConstraintsSpec(Section):
     )
     own: dict[str, dict[str, Finite]] = Field(
         default_factory=dict,
-        description="constraints that were added to the catalogue, by name, with their settings",
+        description="constraints without a section here, as those of packages, by name, with "
+        "their settings",
+        json_schema_extra={"x-family": "constraints"},
     )
 
     @field_validator("keep_out")

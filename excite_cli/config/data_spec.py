@@ -1,6 +1,6 @@
 """What a YAML file may say about measured data: torque, filters, declared effects, diagnosis."""
 
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -66,7 +66,8 @@ def with_preset(values: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-EffectKind = str
+EffectKind = Annotated[str, Field(json_schema_extra={"x-family": "effects"})]
+CheckName = Annotated[str, Field(json_schema_extra={"x-family": "checks"})]
 RunStates = dict[EffectKind, str]  # `none`: without it
 
 
@@ -212,7 +213,7 @@ class MeasurementSpec(Section):
         "all that hold it",
     )
     base: BaseStateSpec = Field(BaseStateSpec(), description="how the base moved meanwhile")
-    trust: bool | tuple[str, ...] = Field(
+    trust: bool | tuple[CheckName, ...] = Field(
         False,
         description="checks of `excite inspect` whose doubts are resolved, as [direction of "
         "gravity]; true: mount, zeros, signs, order, units and clock are as the config says",

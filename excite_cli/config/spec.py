@@ -11,6 +11,7 @@ from pydantic import Field, StrictBool
 from excite_cli.config.constraints_spec import ConstraintsSpec
 from excite_cli.config.data_spec import (
     DiagnosisSpec,
+    EffectKind,
     EffectSpec,
     IdentificationSpec,
     MeasurementSpec,
@@ -68,7 +69,7 @@ class UncertaintySpec(BodyUncertaintySpec):
 class IdentifiedEffectSpec(Section):
     """An effect with its values."""
 
-    kind: str = Field(description="one of the effects")
+    kind: EffectKind = Field(description="one of the effects")
     joints: tuple[str, ...] = Field(description="names of the joints that it acts on")
     shape: dict[str, Finite] = Field(
         default_factory=dict, description="values of its non-linear parameters"
@@ -101,25 +102,13 @@ class IdentifiedSpec(Section):
     )
 
 
-CriterionKind = Literal[
-    "condition_number",
-    "smooth_condition_number",
-    "log_det",
-    "sigma_min",
-    "trace_inverse",
-    "torque_deviation",
-    "predicted_torque",
-    "condition_and_sigma_min",
-]
-
-
 class CriterionSpec(Section):
     """What is minimised, and how rows and columns of the regressor are weighted."""
 
-    kind: CriterionKind | str = Field(
+    kind: str = Field(
         "condition_number",
-        description="function of the singular values; see docs/criteria.md; or the name of one "
-        "that was added to the catalogue",
+        description="function of the singular values; see docs/criteria.md",
+        json_schema_extra={"x-family": "criteria"},
     )
     smoothing: Power = Field(64.0, description="p of the smooth condition number")
     row_weights: Literal["none", "effort"] | dict[str, Positive] = Field(

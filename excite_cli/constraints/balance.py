@@ -8,10 +8,14 @@ With uncertain inertias the margin (offset M − normal·Σ m c) / M is the leas
 numerator and mass are linear in φ (`dynamics.least_ratio`).
 """
 
+from collections.abc import Iterable
+
 import numpy as np
 
+from excite_cli.config.constraints_spec import DiscSpec, PolygonSpec
 from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.constraints.drawing import ConstraintScene, GroundRegion
+from excite_cli.constraints.setting import Setting
 from excite_cli.constraints.support_polygon import Support, support_polygon
 from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.forward_kinematics import States
@@ -62,6 +66,18 @@ class Balance(Constraint):
             # One choice for margins and proof, lest they contradict each other.
             self._known = uncertainty.sharpest(full)
             self._admitted = self._known.of_masses()
+
+    @classmethod
+    def build(cls, spec: DiscSpec | PolygonSpec, setting: Setting) -> Iterable[Constraint]:
+        """A disc, or a polygon."""
+        robot, uncertainty = setting.robot, setting.uncertainty
+        if isinstance(spec, PolygonSpec):
+            return [cls.polygon(robot, np.array(spec.vertices), spec.margin, uncertainty)]
+        if spec.center == "posture":
+            center = setting.posture_center_of_mass()
+        else:
+            center = np.array(spec.center, dtype=float)
+        return [cls.disc(robot, center, spec.radius, uncertainty)]
 
     @classmethod
     def disc(

@@ -1,14 +1,18 @@
 """What a constraint has to show: bodies, regions and the nearest points, for any way to draw."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
-from excite_cli.geometry.obstacles import Obstacle
-from excite_cli.robot.capsule import Capsule
-
-Array = NDArray[np.float64]
+if TYPE_CHECKING:
+    from excite_cli.dynamics.forward_kinematics import States
+    from excite_cli.geometry.link_meshes import Poses
+    from excite_cli.geometry.obstacles import Obstacle
+    from excite_cli.geometry.reasons import DroppedPair
+    from excite_cli.robot.capsule import Capsule
+    from excite_cli.robot.model import Array
+    from excite_cli.shown.note import Note
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,3 +49,44 @@ class NearestBodies:
     ends: Array
     capsules: tuple[tuple[Capsule, ...], ...]
     labels: tuple[str, ...]
+
+
+class Drawable:
+    """What a constraint is called, says of itself and shows: by default no more than its margin."""
+
+    name: str
+
+    @property
+    def title(self) -> str:
+        """What the margin is, as the heading of a picture."""
+        return self.name.replace("_", " ").capitalize()
+
+    @property
+    def left_out(self) -> tuple[DroppedPair, ...] | None:
+        """Pairs that are not kept apart, with reasons; None where columns are not pairs.
+
+        Pairs are chosen among those that can come near within the position limits.
+        """
+        return None
+
+    def capsules_of(self, column: int) -> tuple[Capsule, ...]:
+        """The robot's capsules, one or two, whose distance the column is; () for other margins."""
+        return ()
+
+    @property
+    def remarks(self) -> tuple[Note, ...]:
+        """What is worth saying about it before work begins."""
+        return ()
+
+    @property
+    def drawing(self) -> ConstraintScene:
+        """What of it can be drawn, at rest."""
+        return ConstraintScene()
+
+    def nearest(self, poses: Poses, margins: Array) -> NearestBodies | None:
+        """The nearest two bodies at poses with these margins (T, m); None without `drawing`s."""
+        return None
+
+    def ground_point(self, states: States) -> Array | None:
+        """World x, y (T, 2) [m] of what the region drawn is for, if not for the centre of mass."""
+        return None

@@ -13,18 +13,22 @@ not about p, to stay linear; both agree where the horizontal force is small. Up 
 base that stands still is taken to stand with all of its feet.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
+from excite_cli.config.constraints_spec import ContactSpec
 from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.constraints.drawing import ConstraintScene, GroundRegion
-from excite_cli.constraints.support_polygon import Support
+from excite_cli.constraints.setting import Setting
+from excite_cli.constraints.support_polygon import Support, support_polygon
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.dynamics.least_ratio import Ratios, least_ratios, least_values, worst_inertias
 from excite_cli.dynamics.row_adjoint import RowAdjoint
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
 from excite_cli.dynamics.whole_robot import GroundWrench, drawn_states, whole_parameters
+from excite_cli.errors import ConfigError
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.enclosed_rows import combined, ground_rows, least_of
 from excite_cli.robot.model import Robot
@@ -175,6 +179,29 @@ class GroundContact(Constraint):
         self.scale = _ROOM * ground.weight * np.array([form[2] for form in forms.values()])
         self._units = tuple(form[3] for form in forms.values())
         self.uncertainty = ground.admitted(self.functionals)
+
+    @classmethod
+    def build(cls, spec: ContactSpec, setting: Setting) -> Iterable[Constraint]:
+        """With a support polygon also the zero-moment point."""
+        robot = setting.robot
+        ground = Ground.under(robot, setting.uncertainty)
+        if ground.weight <= 0:
+            raise ConfigError(
+                "constraints.contact: gravity does not press this robot on the ground. It needs a "
+                "mass and robot.gravity with a negative z; leave contact out for what is not on "
+                "the ground."
+            )
+        found: list[Constraint] = []
+        center = None
+        if spec.vertices is not None:
+            feet = np.array(spec.vertices, dtype=float)
+            support = support_polygon(feet, spec.margin, "constraints.contact")
+            found.append(ZeroMomentPoint(ground, support, spec.height, feet))
+            center = support.center
+        if center is None:
+            center = setting.posture_center_of_mass()
+        found.append(cls(ground, center, spec.friction, spec.torsion, spec.min_load))
+        return found
 
     def unit_of(self, column: int) -> str:
         """Newton metres for torsion."""

@@ -1,13 +1,19 @@
 """Bounds on joint positions, velocities or accelerations (Eq. 51): linear, one joint a row."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.config.constraints_spec import JointLimitsSpec
 from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.constraints.joint_columns import JointColumns, Quantity
+from excite_cli.constraints.motor_limits import MotorBound
+from excite_cli.constraints.setting import Setting
 from excite_cli.dynamics.forward_kinematics import States
+from excite_cli.errors import ConfigError
+from excite_cli.measurement.motors import Motors
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.robot.model import Robot
 
@@ -78,6 +84,34 @@ class JointBound(Constraint):
             sliding=robot.sliding,
         )
 
+    @classmethod
+    def build(cls, spec: JointLimitsSpec, setting: Setting) -> Iterable[Constraint]:
+        """Of positions, speeds and accelerations, of joints and of motors that drive several."""
+        robot = setting.robot
+        found: list[Constraint] = []
+        limits, names = robot.limits, robot.joint_names
+        if spec.position:
+            lower = limits.lower + spec.position_margin
+            upper = limits.upper - spec.position_margin
+            crossed = [n for n, low, high in zip(names, lower, upper, strict=True) if low >= high]
+            if crossed:
+                raise ConfigError(
+                    f"constraints.joint_limits.position_margin: {spec.position_margin:g} leaves no "
+                    f"range for {', '.join(crossed)}."
+                )
+            found.append(cls.between(0, lower, upper, robot))
+        if spec.velocity is not False:
+            given = None if spec.velocity is True else float(spec.velocity)
+            speed = limits.velocity if given is None else np.minimum(limits.velocity, given)
+            speed = spec.scale * speed
+            found.append(cls.between(1, -speed, speed, robot))
+        acceleration = limits.acceleration
+        if spec.acceleration is not None:
+            acceleration = np.minimum(acceleration, spec.acceleration)
+        found.append(cls.between(2, -acceleration, acceleration, robot))
+        of_motors = () if robot.motors is None else _motor_bounds(spec, robot.motors)
+        return [bound for bound in (*found, *of_motors) if bound.labels]
+
     def values(self, states: States) -> Array:
         """The bounded quantity (T, n)."""
         return (states.q, states.v, states.a)[self.order]
@@ -101,3 +135,14 @@ class JointBound(Constraint):
         parts: list[Array | None] = [None, None, None]
         parts[self.order] = rows
         return parts[0], parts[1], parts[2]
+
+
+def _motor_bounds(spec: JointLimitsSpec, motors: Motors) -> Iterable[Constraint]:
+    """As those of joints, for motors that drive several."""
+    if spec.position:
+        yield MotorBound(motors, 0, *motors.ranges())
+    if spec.velocity is not False:
+        speed = spec.scale * motors.bounds("velocity")
+        yield MotorBound(motors, 1, -speed, speed)
+    acceleration = motors.bounds("acceleration")
+    yield MotorBound(motors, 2, -acceleration, acceleration)

@@ -5,17 +5,22 @@ limit + min_φ (∓ Y_j φ) ≥ 0. The derivative of that margin is a derivative
 worst inertias, which differ between instants, joints and sides.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
+from excite_cli.config.constraints_spec import TorqueSpec
 from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.constraints.joint_columns import JointColumns, Quantity
+from excite_cli.constraints.motor_limits import MotorTorque
+from excite_cli.constraints.setting import Setting
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.dynamics.regressor import InverseDynamics, Regressor
 from excite_cli.dynamics.row_adjoint import RowAdjoint
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
 from excite_cli.dynamics.whole_robot import drawn_states
+from excite_cli.errors import ConfigError
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.enclosed_rows import least_of, torque_rows
 from excite_cli.robot.model import Robot
@@ -53,6 +58,25 @@ class JointTorque(Constraint):
             rows = self._regressor.evaluate(drawn.q, drawn.v, drawn.a)[:, bounded]
             self._admitted = self._admitted.sharpest(rows.reshape(-1, rows.shape[-1]))
             self._adjoint = RowAdjoint(robot)
+
+    @classmethod
+    def build(cls, spec: TorqueSpec, setting: Setting) -> Iterable[Constraint]:
+        """Limits of joints, and of motors that drive several."""
+        robot = setting.robot
+        of_motors = np.full(robot.n, np.inf)
+        if robot.motors is not None:
+            of_motors = spec.scale * robot.motors.bounds("effort")
+        found: list[Constraint] = []
+        if np.isfinite(of_motors).any():
+            found.append(MotorTorque(robot, of_motors, setting.uncertainty))
+        if not found and not np.isfinite(robot.limits.effort).any():
+            raise ConfigError(
+                "constraints.torque: the URDF gives no effort limits; give "
+                "robot.limits.<joint>.effort."
+            )
+        if np.isfinite(robot.limits.effort).any():
+            found.insert(0, cls(robot, spec.scale * robot.limits.effort, setting.uncertainty))
+        return found
 
     @property
     def of_joints(self) -> JointColumns:

@@ -5,11 +5,14 @@ max(from − q, q − to), which is negative inside: minus the way to its neares
 taken as they are; a region does not repeat after a turn.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
+from excite_cli.config.constraints_spec import KeepOutSpec
 from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.setting import Setting
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.proof.enclosed_motion import EnclosedMotion
@@ -40,6 +43,12 @@ class KeepOut(Constraint):
         self.labels = tuple(region.name for region in regions)
         self.scale = np.full(len(regions), _SCALE)
         self._names, self._sliding = robot.joint_names, robot.sliding
+
+    @classmethod
+    def build(cls, spec: dict[str, KeepOutSpec], setting: Setting) -> Iterable[Constraint]:
+        """Of the regions, those that can be entered."""
+        constraint = build_keep_out(spec, setting.robot)
+        return [] if constraint is None else [constraint]
 
     def unit_of(self, column: int) -> str:
         """Metres where all joints of the region slide; both names where some do."""

@@ -1,18 +1,21 @@
 """Distances of the robot's capsules from what stands around it: floor, walls, boxes."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
+from excite_cli.config.constraints_spec import SurroundingsSpec
 from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.constraints.drawing import ConstraintScene, NearestBodies
 from excite_cli.constraints.nearest_bodies import nearest_obstacles
-from excite_cli.constraints.remark import counted_reasons
+from excite_cli.constraints.setting import Setting
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.geometry.coal_distances import CoalDistances
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.geometry.obstacle_distances import ObstacleDistances
-from excite_cli.geometry.obstacle_pairs import ObstaclePairs
-from excite_cli.geometry.obstacles import Box, Obstacle
-from excite_cli.geometry.reasons import DroppedPair, Why, reason_in_words
+from excite_cli.geometry.obstacle_pairs import ObstaclePairs, choose_obstacle_pairs
+from excite_cli.geometry.obstacles import Box, Obstacle, build_obstacles
+from excite_cli.geometry.reasons import DroppedPair, Why, counted_reasons, reason_in_words
 from excite_cli.proof.enclosed_distances import EnclosedCapsules
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.enclosed_obstacles import least_clearances
@@ -48,6 +51,13 @@ class Surroundings(Constraint):
         self._distances = ObstacleDistances(robot, capsules, obstacles, pairs.checked)
         self.labels = tuple(f"{capsules[i].name} – {obstacles[j].name}" for i, j in pairs.checked)
         self.scale = np.full(len(self.labels), _NEAR)
+
+    @classmethod
+    def build(cls, spec: SurroundingsSpec, setting: Setting) -> Iterable[Constraint]:
+        """Nothing where no link can reach them."""
+        robot, capsules, obstacles = setting.robot, setting.capsules, build_obstacles(spec)
+        pairs = choose_obstacle_pairs(robot, capsules, obstacles, spec, setting.bounded)
+        return [cls(robot, capsules, obstacles, pairs)] if pairs.checked else []
 
     @property
     def left_out(self) -> tuple[DroppedPair, ...]:

@@ -1,17 +1,22 @@
 """Distances between capsules (Eq. 53 with its sign corrected): d_ij ≥ r_i + r_j + margin."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
+from excite_cli.config.constraints_spec import SelfCollisionSpec
 from excite_cli.constraints.base import Array, Constraint, Indices
 from excite_cli.constraints.drawing import ConstraintScene, NearestBodies
+from excite_cli.constraints.mesh_clearance import KEPT, MeshClearance
 from excite_cli.constraints.nearest_bodies import nearest_capsules
-from excite_cli.constraints.remark import counted_reasons
+from excite_cli.constraints.setting import Setting
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.geometry.coal_distances import CoalDistances
-from excite_cli.geometry.collision_pairs import CollisionPairs
+from excite_cli.geometry.collision_pairs import CollisionPairs, choose_pairs
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.geometry.pair_distances import PairDistances
-from excite_cli.geometry.reasons import DroppedPair
+from excite_cli.geometry.pair_tables import mesh_tables, require_tabled
+from excite_cli.geometry.reasons import DroppedPair, counted_reasons
 from excite_cli.proof.enclosed_distances import EnclosedCapsules
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.robot.capsule import Capsule
@@ -61,6 +66,19 @@ class SelfCollision(Constraint):
         self.labels = tuple(f"{capsules[i].name} – {capsules[j].name}" for i, j in pairs.checked)
         usual = float(np.median([capsule.radius for capsule in capsules]))
         self.scale = np.full(len(self.labels), np.clip(_RADII * usual, _LEAST_NEAR, _NEAR))
+
+    @classmethod
+    def build(cls, spec: SelfCollisionSpec, setting: Setting) -> Iterable[Constraint]:
+        """By capsules, and by meshes where these are asked for."""
+        robot, capsules = setting.robot, setting.capsules
+        pairs = choose_pairs(robot, capsules, spec, bounded=setting.bounded)
+        require_tabled(robot, capsules, spec.by_meshes)
+        tables = mesh_tables(robot, capsules, pairs, spec.ignore)
+        meshes = [MeshClearance(tables, min(KEPT, spec.margin))] if tables else []
+        if not pairs.checked:
+            return meshes
+        tabled = tuple((table.first, table.second) for each in meshes for table in each.tables)
+        return [cls(robot, capsules, pairs, spec.margin, tabled), *meshes]
 
     @property
     def left_out(self) -> tuple[DroppedPair, ...]:

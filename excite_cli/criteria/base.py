@@ -4,10 +4,16 @@ A member gives the value f(σ) that is minimised and its derivative ∂f/∂σ. 
 derivative with respect to the matrix is Σ_k (∂f/∂σ_k) u_k v_kᵀ, so one adjoint serves them all.
 """
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from excite_cli.config.spec import CriterionSpec
 
 Array = NDArray[np.float64]
 
@@ -26,6 +32,11 @@ class Criterion(ABC):
     compares_columns: bool = False
     """Whether it is about columns beside each other, so that one alone says nothing."""
 
+    @classmethod
+    def build(cls, spec: CriterionSpec) -> Criterion:
+        """The criterion with what a config says of it."""
+        return cls()
+
     @abstractmethod
     def value(self, sigma: Array) -> float:
         """f(σ) for σ (r,) in descending order."""
@@ -39,7 +50,7 @@ class Criterion(ABC):
         """Whether f is differentiable where singular values meet."""
         return True
 
-    def continuation(self) -> tuple["Criterion", ...]:
+    def continuation(self) -> tuple[Criterion, ...]:
         """Criteria to minimise one after the other, each a closer stand-in for this one."""
         return (self,)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from excite_cli.config.spec import CriterionSpec
 from excite_cli.criteria.base import Array, Criterion
 
 
@@ -17,6 +18,11 @@ class SmoothConditionNumber(Criterion):
     p: float
     name = "smooth_condition_number"
     compares_columns = True
+
+    @classmethod
+    def build(cls, spec: CriterionSpec) -> Criterion:
+        """With the `smoothing` of the config."""
+        return cls(spec.smoothing)
 
     def value(self, sigma: Array) -> float:
         """Computed in logarithms, so that no power overflows."""

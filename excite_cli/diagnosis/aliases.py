@@ -24,8 +24,7 @@ from excite_cli.diagnosis.judgement import Judgement
 from excite_cli.diagnosis.modelled_run import DeclaredModel
 from excite_cli.diagnosis.records import ConfoundedCandidate
 from excite_cli.diagnosis.schur import ABSORBED, SHARED, Schur
-from excite_cli.effects.base import Effect
-from excite_cli.effects.place import Place
+from excite_cli.effects.base import Effect, Place
 from excite_cli.robot.model import Array
 
 # Effects that would show as other values of inertial parameters only, and of which.

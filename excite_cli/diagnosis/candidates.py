@@ -1,6 +1,5 @@
 """What a diagnosis looks for: every kind of the catalogue, at every place, with every shape."""
 
-import warnings
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,11 +11,10 @@ from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.in_runs import SeenRuns, changes, effects_of_runs
 from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.diagnosis.run_sets import sets_looked_at
-from excite_cli.effects.base import Effect, Signals
-from excite_cli.effects.catalogue import catalogue, is_of_a_package, kind_named, shows
-from excite_cli.effects.place import Place
+from excite_cli.effects.base import Effect, Place, Signals
+from excite_cli.effects.catalogue import EFFECTS, catalogue, kind_named, shows
 from excite_cli.effects.placing import places_named
-from excite_cli.errors import ConfigError, ExciteWarning
+from excite_cli.errors import ConfigError
 from excite_cli.identification.least_squares import EXACT
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.processing import DEFAULT_MOVING
@@ -89,13 +87,12 @@ def possible_effects(
             places = _places(kind, seen.robot, spec)
             effects, tests = _of_kind(kind, places, known, seen, searched)
             changed = changes(kind, known_in_runs, seen)
-            if is_of_a_package(kind):
+            if kind.kind in EFFECTS.foreign:
                 require_columns([*effects, *(each for each, _ in changed)], seen.signals)
         except (Exception, SystemExit) as error:
-            if not is_of_a_package(kind):
+            if kind.kind not in EFFECTS.foreign:
                 raise
-            words = f"effect '{name}' of a package is set aside: {type(error).__name__}: {error}"
-            warnings.warn(words, ExciteWarning, stacklevel=2)
+            EFFECTS.set_aside(f"effect '{name}'", f"{type(error).__name__}: {error}")
             continue
         count = max(tests, len(effects)) * len(names)
         for at, near in around.items():
@@ -154,7 +151,7 @@ def _searched(
         place
         for kind in kinds
         if kind.is_searched() and not (kind.per_run or kind.follows_covariate)
-        if not is_of_a_package(kind)
+        if kind.kind not in EFFECTS.foreign
         for joints in _places(kind, seen.robot, spec)
         if (place := Place(kind.kind, joints)) not in known
     ]

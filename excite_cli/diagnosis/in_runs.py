@@ -20,9 +20,8 @@ from excite_cli.diagnosis.run_sets import (
     run_sets,
     sets_looked_at,
 )
-from excite_cli.effects.base import Effect, Signals
+from excite_cli.effects.base import Effect, Place, Signals
 from excite_cli.effects.catalogue import shows
-from excite_cli.effects.place import Place
 from excite_cli.identification.declared_states import States, declared_sets
 from excite_cli.robot.model import Array, Robot
 from excite_cli.workers.base import Tell

@@ -20,7 +20,7 @@ from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence
 from excite_cli.diagnosis.schur import Gain, Schur
 from excite_cli.diagnosis.verdict import Verdict
-from excite_cli.effects.place import Place
+from excite_cli.effects.base import Place
 from excite_cli.robot.model import Array
 
 _KEPT = 4096  # verdicts that are kept: a step of the search asks for the last one's again

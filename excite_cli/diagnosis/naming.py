@@ -28,7 +28,7 @@ from excite_cli.diagnosis.schur import SHARED
 from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.diagnosis.words import joints_in_words
-from excite_cli.effects.place import Place
+from excite_cli.effects.base import Place
 from excite_cli.effects.placing import told_on
 from excite_cli.robot.model import Array
 

@@ -7,7 +7,7 @@ import numpy as np
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.extrapolation import Reach
 from excite_cli.effects.base import Effect
-from excite_cli.effects.seen import Seen
+from excite_cli.effects.judgement import Seen
 from excite_cli.robot.model import Array
 
 _ERRORS = 2.0  # deviations by which what is there may be less than what is taken

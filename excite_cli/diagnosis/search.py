@@ -14,8 +14,7 @@ import numpy as np
 from excite_cli.diagnosis.judgement import Judgement
 from excite_cli.diagnosis.schur import Schur
 from excite_cli.diagnosis.verdict import Verdict
-from excite_cli.effects.base import Tier
-from excite_cli.effects.place import Place
+from excite_cli.effects.base import Place, Tier
 
 _MOST_STEPS = 80
 _TRIED = 12  # best candidates whose gain on runs left out is looked at in a step

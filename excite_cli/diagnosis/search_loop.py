@@ -39,7 +39,7 @@ from excite_cli.dynamics.inertial_prior import InertialPrior
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import scales
-from excite_cli.effects.seen import Seen
+from excite_cli.effects.judgement import Seen
 from excite_cli.identification.declared_states import LeftOut, declared_sets
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.prior import as_wide_as_needed

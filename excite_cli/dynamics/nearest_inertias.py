@@ -80,14 +80,6 @@ def _bounded(back: Array, start: Array, lengths: Array) -> Array:
     return found
 
 
-def half_of(covariance: Array) -> Array:
-    """B (size, size) with B Bᵀ a `covariance`, however ill-conditioned."""
-    scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    scale[scale < 1e-150] = 1.0
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 1e-12)))
-
-
 def _least_norm(rows: Array, bounds: Array, signs: int, bodies: int) -> tuple[Array, str]:
     import clarabel
 

@@ -61,6 +61,10 @@ class RigidBody:
         own = {key: value for key, value in self.__dict__.items() if key not in derived}
         return {**own, "_given": None}
 
+    def cut(self, at: slice) -> "RigidBody":
+        """Some of the samples."""
+        return RigidBody(self.robot, self.phi, self.q[at], self.v[at], self.a[at])
+
     @cached_property
     def _model(self) -> pin.Model:
         return robot_with(self.robot, self.phi) if self._given is None else self._given

@@ -1,111 +1,27 @@
-"""The catalogue: every kind of effect by its name; users' own come through an entry point.
+"""All effects by their kind, and those that a config or a description declares."""
 
-A package that declares, in the group `excite.effects`, a name for a subclass of `Effect` adds it.
-"""
-
-from collections.abc import Mapping
-from functools import cache
-from importlib.metadata import entry_points
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
 from excite_cli.config.data_spec import EffectSpec
-from excite_cli.effects.armature import Armature
-from excite_cli.effects.asymmetric_friction import AsymmetricFriction
-from excite_cli.effects.backlash import Backlash
 from excite_cli.effects.base import Effect
-from excite_cli.effects.base_tilt import BaseTilt
-from excite_cli.effects.cable_force import CableForce
-from excite_cli.effects.contact import Contact
 from excite_cli.effects.coulomb_friction import CoulombFriction
-from excite_cli.effects.coupled_friction import CoupledFriction
-from excite_cli.effects.covariate_friction import CovariateFriction
-from excite_cli.effects.covariate_offset import CovariateOffset
-from excite_cli.effects.dahl_friction import DahlFriction
-from excite_cli.effects.elasticity import Elasticity
-from excite_cli.effects.encoder_offset import EncoderOffset
-from excite_cli.effects.friction_change import FrictionChange
-from excite_cli.effects.friction_drift import FrictionDrift
-from excite_cli.effects.load_dependent_friction import LoadDependentFriction
-from excite_cli.effects.nonlinear_viscous_friction import NonlinearViscousFriction
 from excite_cli.effects.payload import Payload
 from excite_cli.effects.placing import ALL, places_named
-from excite_cli.effects.position_friction import PositionFriction
-from excite_cli.effects.ripple import Ripple
-from excite_cli.effects.spring import Spring
-from excite_cli.effects.stribeck_friction import StribeckFriction
-from excite_cli.effects.torque_delay import TorqueDelay
 from excite_cli.effects.torque_gain import TorqueGain
-from excite_cli.effects.torque_offset import TorqueOffset
-from excite_cli.effects.torque_saturation import TorqueSaturation
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.effects.wrench_gain import WrenchGain
 from excite_cli.errors import ConfigError, nearest
-from excite_cli.packages import members, set_aside
+from excite_cli.registry import Registry
 from excite_cli.robot.model import Array, Robot
 
-GROUP = "excite.effects"
 # What every textbook's model of a joint has beside the rigid body; the rest of it where data ask.
 EVERYDAY_FRICTION = ("viscous_friction", "coulomb_friction")
 EVERYDAY = ("torque_offset", "armature")
-_OURS: tuple[type[Effect], ...] = (
-    ViscousFriction,
-    NonlinearViscousFriction,
-    CoulombFriction,
-    AsymmetricFriction,
-    StribeckFriction,
-    LoadDependentFriction,
-    PositionFriction,
-    DahlFriction,
-    FrictionDrift,
-    FrictionChange,
-    CovariateFriction,
-    CoupledFriction,
-    Armature,
-    Spring,
-    TorqueOffset,
-    CovariateOffset,
-    TorqueGain,
-    TorqueDelay,
-    WrenchGain,
-    TorqueSaturation,
-    Ripple,
-    CableForce,
-    Elasticity,
-    Backlash,
-    BaseTilt,
-    Payload,
-    EncoderOffset,
-    Contact,
-)
 
 
-@cache
-def catalogue() -> Mapping[str, type[Effect]]:
-    """All kinds by name.
-
-    An effect of a package that cannot be used is set aside, with an `ExciteWarning` that says why.
-    """
-    kinds = {effect.kind: effect for effect in _OURS}
-    needed = ("kind", "title", "parameters")
-    for whose, found in members(GROUP, Effect, needed, "effect"):  # type: ignore[type-abstract]
-        if found.kind in kinds:
-            set_aside(whose, f"there is another effect '{found.kind}'.")
-        else:
-            kinds[found.kind] = found
-    for kind in [each for each in kinds.values() if is_of_a_package(each)]:
-        if flaw := _names_of_none(kind, kinds):
-            set_aside(f"effect '{kind.kind}'", flaw)
-            del kinds[kind.kind]
-    return kinds
-
-
-def is_of_a_package(kind: type[Effect]) -> bool:
-    """Whether it came through an entry point: it may do what effects of ours never do."""
-    return kind not in _OURS
-
-
-def _names_of_none(kind: type[Effect], kinds: Mapping[str, type[Effect]]) -> str:
+def _flaw(kind: type[Effect], kinds: Collection[str]) -> str:
     """What `kind` says of kinds that there are not; empty if it says nothing of such."""
     for trait in ("refines", "excludes", "same_as", "deviates_from", "changes_of"):
         for name in getattr(kind, trait):
@@ -114,23 +30,53 @@ def _names_of_none(kind: type[Effect], kinds: Mapping[str, type[Effect]]) -> str
     return ""
 
 
-def kind_named(name: str, where: str = "effects") -> type[Effect]:
-    """The class of a kind.
+EFFECTS: Registry[Effect] = Registry(
+    "effect",
+    "excite.effects",
+    Effect,
+    {
+        "viscous_friction": "viscous_friction:ViscousFriction",
+        "nonlinear_viscous_friction": "nonlinear_viscous_friction:NonlinearViscousFriction",
+        "coulomb_friction": "coulomb_friction:CoulombFriction",
+        "asymmetric_friction": "asymmetric_friction:AsymmetricFriction",
+        "stribeck_friction": "stribeck_friction:StribeckFriction",
+        "load_dependent_friction": "load_dependent_friction:LoadDependentFriction",
+        "position_friction": "position_friction:PositionFriction",
+        "dahl_friction": "dahl_friction:DahlFriction",
+        "friction_drift": "friction_drift:FrictionDrift",
+        "friction_change": "friction_change:FrictionChange",
+        "covariate_friction": "covariate_friction:CovariateFriction",
+        "coupled_friction": "coupled_friction:CoupledFriction",
+        "armature": "armature:Armature",
+        "spring": "spring:Spring",
+        "torque_offset": "torque_offset:TorqueOffset",
+        "covariate_offset": "covariate_offset:CovariateOffset",
+        "torque_gain": "torque_gain:TorqueGain",
+        "torque_delay": "torque_delay:TorqueDelay",
+        "wrench_gain": "wrench_gain:WrenchGain",
+        "torque_saturation": "torque_saturation:TorqueSaturation",
+        "ripple": "ripple:Ripple",
+        "cable_force": "cable_force:CableForce",
+        "elasticity": "elasticity:Elasticity",
+        "backlash": "backlash:Backlash",
+        "base_tilt": "base_tilt:BaseTilt",
+        "payload": "payload:Payload",
+        "encoder_offset": "encoder_offset:EncoderOffset",
+        "contact": "contact:Contact",
+    },
+    ("kind", "title", "parameters"),
+    _flaw,
+)
 
-    Raises
-    ------
-    ConfigError
-        There is none of this name.
-    """
-    kinds = catalogue()
-    if name not in kinds:
-        aside = any(point.name == name for point in entry_points(group=GROUP))
-        told = " A package has one, which cannot be used: see the warning." if aside else ""
-        raise ConfigError(
-            f"{where}: there is no effect '{name}'.{told or nearest(name, kinds)} "
-            f"Effects: {', '.join(kinds)}."
-        )
-    return kinds[name]
+
+def catalogue() -> Mapping[str, type[Effect]]:
+    """All kinds by name."""
+    return EFFECTS.members
+
+
+def kind_named(name: str, where: str = "effects") -> type[Effect]:
+    """The class of a kind; ConfigError if there is none of this name."""
+    return EFFECTS.named(name, where)
 
 
 def declared_effects(specs: tuple[EffectSpec, ...] | None, robot: Robot) -> tuple[Effect, ...]:

@@ -21,7 +21,7 @@ from excite_cli.effects.base import (
     steps_by_ratio,
 )
 from excite_cli.effects.c_code import all_joints, real, reals
-from excite_cli.effects.seen import Seen
+from excite_cli.effects.judgement import Seen
 from excite_cli.effects.simulated_robot import Push, SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 

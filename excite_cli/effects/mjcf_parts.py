@@ -1,8 +1,13 @@
 """Parts of a MuJoCo model that effects become: attributes of joints, tendons, gravity."""
 
-from dataclasses import dataclass, field
+from __future__ import annotations
 
-from excite_cli.robot.model import Array
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from excite_cli.robot.model import Array
+
 
 # Attributes of a joint that add up; `damping_2`, `damping_3` belong to v|v| and v³.
 ADDED = ("damping", "damping_2", "damping_3", "frictionloss", "armature")

@@ -3,8 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from excite_cli.robot.model import Array
+Array = NDArray[np.float64]
+
 
 Range = tuple[float, float]
 

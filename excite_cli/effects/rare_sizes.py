@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.dynamics.nearest_inertias import half_of
-from excite_cli.robot.model import Array
+Array = NDArray[np.float64]
+
 
 # Chance of a true effect to look impossible by the error of the fit, and be refused.
 _CHANCE = 0.01
@@ -26,6 +26,14 @@ def unlikely_distance(count: int) -> float:
     from scipy.stats import chi2  # slow to import
 
     return float(chi2.isf(_CHANCE, count))
+
+
+def half_of(covariance: Array) -> Array:
+    """B (size, size) with B Bᵀ a `covariance`, however ill-conditioned."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    scale[scale < 1e-150] = 1.0
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 1e-12)))
 
 
 def nearest_of_sign(values: Array, covariance: Array, signed: NDArray[np.bool_]) -> Array:

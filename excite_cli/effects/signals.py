@@ -1,13 +1,18 @@
 """What an effect sees of a motion, and how its derivative is handed back."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.measurement.run_identity import RunId
-from excite_cli.robot.model import Array
+
+if TYPE_CHECKING:
+    from excite_cli.dynamics.rigid_body import RigidBody
+    from excite_cli.robot.model import Array
 
 
 @dataclass(frozen=True)
@@ -38,20 +43,18 @@ class Signals:
         """Time on the campaign's clock (T,) [s]."""
         return self.start + self.t
 
-    def every(self, step: int) -> "Signals":
+    def every(self, step: int) -> Signals:
         """Every `step`-th instant."""
         before = None if self.before is None else self.before[::-1][step - 1 :: step][::-1]
         return replace(self.cut(slice(None, None, step)), before=before)
 
-    def cut(self, at: slice) -> "Signals":
+    def cut(self, at: slice) -> Signals:
         """Some of the instants; nothing is known of before."""
-        body = self.body
-        some = RigidBody(body.robot, body.phi, body.q[at], body.v[at], body.a[at])
         series = {name: getattr(self, name)[at] for name in ("t", "q", "v", "a", "load", "torque")}
         others = {name: values[at] for name, values in self.covariates.items()}
-        return replace(self, **series, body=some, covariates=others, before=None)
+        return replace(self, **series, body=self.body.cut(at), covariates=others, before=None)
 
-    def with_covariate(self, name: str) -> "Signals":
+    def with_covariate(self, name: str) -> Signals:
         """The same with that column of the log alone."""
         return replace(self, covariates={name: self.covariates[name]})
 

@@ -4,14 +4,15 @@ Effects say so themselves (`Effect.build_into`); the simulation makes a MuJoCo m
 and knows none of them.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
-from excite_cli.robot.model import Array, Robot
-
 if TYPE_CHECKING:
     from excite_cli.effects.base import Effect
+    from excite_cli.robot.model import Array, Robot
 
 # Attributes of MuJoCo's <joint> that `add_to_joint` takes.
 JOINT_PARTS = frozenset({"damping", "frictionloss", "armature", "stiffness", "springref"})
@@ -90,16 +91,16 @@ class SimulatedRobot(Protocol):
     def add_to_joint(self, joint: int, parts: Mapping[str, float]) -> None:
         """More, or less, of these attributes of MuJoCo's joint (`JOINT_PARTS`); springs add up."""
 
-    def apply(self, effect: "Effect", values: Array) -> None:
+    def apply(self, effect: Effect, values: Array) -> None:
         """The effect's own formula acts as a torque at every control step."""
 
     def remember(self, joint: int, hysteresis: Hysteresis) -> None:
         """The torque of `hysteresis` acts on `joint`, which it follows from step to step."""
 
-    def tell_controller(self, effect: "Effect", values: Array) -> None:
+    def tell_controller(self, effect: Effect, values: Array) -> None:
         """The robot's controller knows the effect and compensates a share of it."""
 
-    def falsify(self, effect: "Effect", values: Array) -> None:
+    def falsify(self, effect: Effect, values: Array) -> None:
         """The effect's own formula is added to the recorded torque; nothing else happens."""
 
 

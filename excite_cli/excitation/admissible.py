@@ -51,7 +51,7 @@ def worst_margins(
     found: dict[str, Worst] = {}
     for times, margins in _chunks(problem, coefficients, fine_times(problem, rate)):
         for constraint, margin in zip(problem.constraints, margins, strict=True):
-            worst = constraint.worst(margin, times)
+            worst = Worst.of(constraint, margin, times)
             before = found.get(constraint.name)
             found[constraint.name] = worst if before is None else before.with_later(worst)
     return found

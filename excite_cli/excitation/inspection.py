@@ -78,7 +78,7 @@ def _compared(constraint: Constraint, least: Array, path: Path, times: Array) ->
     t, column = divmod(int(np.argmax(off)), off.shape[1])
     return SecondPath(
         name=constraint.name,
-        worst=constraint.worst(second, times[chosen]),
+        worst=Worst.of(constraint, second, times[chosen]),
         instants=len(chosen),
         of=len(times),
         difference=float(off[t, column]),
@@ -241,7 +241,7 @@ def _worst(problem: Problem, path: Path, times: Array) -> tuple[dict[str, Worst]
         for constraint, shares in zip(problem.constraints, least, strict=True):
             margins = constraint.margins(states)
             shares[begin : begin + _CHUNK] = (margins / constraint.scale).min(axis=1)
-            worst = constraint.worst(margins, some)
+            worst = Worst.of(constraint, margins, some)
             before = found.get(constraint.name)
             found[constraint.name] = worst if before is None else before.with_later(worst)
     return found, least

@@ -4,7 +4,7 @@ import numpy as np
 
 from excite_cli.errors import ConfigError
 from excite_cli.measurement.dataset import Array
-from excite_cli.measurement.timed_motion import TimedMotion
+from excite_cli.motion_formats.timed_motion import TimedMotion
 from excite_cli.trajectory.fade import Chain, Segment
 
 MAX_INSTANTS, MAX_PERIODS = 2_000_000, 10_000

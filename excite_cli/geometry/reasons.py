@@ -1,5 +1,7 @@
 """Why a pair of shapes is not checked, as records and in words."""
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -123,3 +125,10 @@ _FIGURES = {
 def dropped_in_words(pair: DroppedPair) -> str:
     """`upper_arm – base: adjacent`."""
     return f"{pair.first} – {pair.second}: {reason_in_words(pair.reason)}"
+
+
+def counted_reasons(dropped: Sequence[DroppedPair]) -> str:
+    """How many pairs were dropped for each reason, figures in the reasons left aside."""
+    counts = Counter(pair.reason.why for pair in dropped)
+    told = (f"{count} {why_in_words(why)}" for why, count in counts.most_common())
+    return ", ".join(told) or "none"

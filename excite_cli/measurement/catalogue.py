@@ -10,29 +10,35 @@ from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import ConfigError, FileError, nearest
 from excite_cli.given_files import require_stored
 from excite_cli.measurement.arrange import arrange, check_names, listed
-from excite_cli.measurement.bag_reader import BagReader
 from excite_cli.measurement.base_channel import channels_of_base
 from excite_cli.measurement.covariates import DeclaredCovariates
-from excite_cli.measurement.csv_reader import CsvReader
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
-from excite_cli.measurement.hdf5_reader import Hdf5Reader
 from excite_cli.measurement.joined_files import is_part, with_joined
-from excite_cli.measurement.mat_reader import MatReader
 from excite_cli.measurement.missing_values import known_stamps
 from excite_cli.measurement.motors import Motors
-from excite_cli.measurement.parquet_reader import ParquetReader
 from excite_cli.measurement.quality import checked
 from excite_cli.measurement.reader import SINCE_1970, RawRun, Reader, ReadOptions
 from excite_cli.measurement.recording_limits import RecordingLimits
 from excite_cli.measurement.run_identity import Origin
 from excite_cli.measurement.torque import SECONDS, check_joints, check_motors, declared, to_joints
 from excite_cli.out_of_core import Spool
+from excite_cli.registry import Registry
 from excite_cli.workers.base import Tell
 from excite_cli.workers.context import each
 
-READERS: tuple[Reader, ...] = (
-    Hdf5Reader(), CsvReader(), BagReader(), MatReader(), ParquetReader(),
-)  # fmt: skip
+READERS: Registry[Reader] = Registry(
+    "reader",
+    "excite.readers",
+    Reader,
+    {
+        "HDF5": "hdf5_reader:Hdf5Reader",
+        "CSV": "csv_reader:CsvReader",
+        "ROS bag": "bag_reader:BagReader",
+        "MATLAB": "mat_reader:MatReader",
+        "parquet (also LeRobot folders)": "parquet_reader:ParquetReader",
+    },
+    ("title", "suffixes"),
+)
 _EPOCH = 1e6  # s: stamps beyond count from 1970, not from the start
 
 
@@ -167,10 +173,12 @@ def reader_for(path: Path) -> Reader:
         There is no such file, or no reader for it.
     """
     require_stored(path)
-    for reader in READERS:
-        if reader.recognises(path):
+    for kind in READERS.foreign_first:
+        if (reader := kind()).recognises(path):
             return reader
-    known = "; ".join(f"{reader.title}: {', '.join(reader.suffixes)}" for reader in READERS)
+    known = "; ".join(
+        f"{title}: {', '.join(reader.suffixes)}" for title, reader in READERS.members.items()
+    )
     what = "is of no known format"
     if path.is_dir():
         what = "is a folder without a bag or a dataset of LeRobot"

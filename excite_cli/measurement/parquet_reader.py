@@ -215,7 +215,7 @@ _MOST_EPISODES = 1000
 class ParquetReader(Reader):
     """Tables of one run, and LeRobot's files and folders, of which every episode is a run."""
 
-    title = "parquet, also a LeRobot dataset's folder"
+    title = "parquet (also LeRobot folders)"
     suffixes = (".parquet",)
 
     def recognises(self, path: Path) -> bool:

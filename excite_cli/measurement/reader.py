@@ -4,17 +4,22 @@ A reader knows a format, not the robot: columns keep the file's joint names, uni
 they mean is settled later, by `arrange` (names) and `torque` (units), from what the YAML declares.
 """
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from excite_cli.errors import FileError
-from excite_cli.measurement.base_channel import BaseChannel
-from excite_cli.measurement.dataset import Array, Finding
+
+if TYPE_CHECKING:
+    from excite_cli.measurement.base_channel import BaseChannel
+    from excite_cli.measurement.dataset import Array, Finding
+
 
 MAX_BYTES = 4 * 2**30  # of a file
 MAX_VALUES = 2**28  # numbers taken from a file: 2 GiB in memory
@@ -100,15 +105,7 @@ class Reader(ABC):
 
     @abstractmethod
     def read(self, path: Path, wanted: ReadOptions) -> list[RawRun]:
-        """All recordings of a file.
-
-        Raises
-        ------
-        FileError
-            The file is damaged, too large, or lacks what is needed.
-        MissingExtraError
-            The library for this format is not installed.
-        """
+        """All recordings of a file; FileError if it is damaged, too large, or lacks something."""
 
 
 def check_size(path: Path) -> None:

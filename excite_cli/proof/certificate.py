@@ -38,6 +38,16 @@ class Worst:
     violations: int
     share: float = 0.0
 
+    @classmethod
+    def of(cls, constraint: "Provable", margins: "Array", times: "Array") -> "Worst":
+        """Of margins (T, m) at `times` (T,), and how many are broken."""
+        t, column = divmod(int(np.argmin(margins / constraint.scale)), margins.shape[1])
+        margin = float(margins[t, column])
+        broken = int(np.count_nonzero(margins < -constraint.rounding))
+        share = margin / float(constraint.scale[column])
+        unit, label = constraint.unit_of(column), constraint.labels[column]
+        return cls(margin, unit, label, float(times[t]), broken, share)
+
     def with_later(self, later: "Worst") -> "Worst":
         """The worse of two, by the share of the scale, with the violations of both."""
         worse = later if later.share < self.share else self
@@ -72,8 +82,8 @@ class Provable(Protocol):
     def least(self, motion: EnclosedMotion) -> Array | None:
         """Lower bounds (T, m) over intervals, or None where none is known."""
 
-    def worst(self, margins: Array, times: Array) -> Worst:
-        """The margin that is smallest as a share of its column's scale."""
+    def unit_of(self, column: int) -> str:
+        """Unit of one column."""
 
 
 @dataclass(frozen=True)
@@ -204,7 +214,7 @@ class _Seen:
         self.broken = False
 
     def look(self, margins: Array, times: Array) -> None:
-        worst = self._constraint.worst(margins, times)
+        worst = Worst.of(self._constraint, margins, times)
         self.broken |= bool((margins < -self._constraint.rounding).any())
         if worst.share < self._share:
             self._share, self._margin = worst.share, worst.margin

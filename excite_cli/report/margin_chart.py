@@ -52,7 +52,7 @@ def _line(constraint: Constraint, margins: Array, times: Array, motion: Motion) 
     units = {constraint.unit_of(column) for column in range(len(constraint.labels))}
     shares = constraint.of_joints is not None or len(units) > 1
     values = (margins / constraint.scale if shares else margins).min(axis=1)
-    seen = constraint.worst(margins, times)
+    seen = Worst.of(constraint, margins, times)
     stored = motion.margins.get(constraint.name)
     return _Line(
         constraint=constraint,

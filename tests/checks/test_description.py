@@ -13,8 +13,9 @@ from scipy.spatial.transform import Rotation
 from excite_cli.api.inspecting import inspect
 from excite_cli.api.loading import load_case
 from excite_cli.checks.check_result import CheckResult
-from excite_cli.checks.rows import NAMES, of_description
+from excite_cli.checks.rows import names, of_description
 from excite_cli.config.robot_spec import RobotSpec
+from excite_cli.config.spec import Spec
 from excite_cli.robot.model import Array, build_robot
 
 Link = dict[str, Any]
@@ -76,7 +77,8 @@ def judged(links: list[Link], **keys: Any) -> list[CheckResult]:
     """What is doubted, but for what test_bodies.py tries."""
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "arms.urdf").write_text(urdf_of(links), encoding="utf-8")
-        found = of_description(build_robot(RobotSpec(urdf="arms.urdf", **keys), Path(folder)))
+        spec = Spec(robot=RobotSpec(urdf="arms.urdf", **keys))
+        found = of_description(build_robot(spec.robot, Path(folder)), spec)
     return [each for each in found if each.kind != "impossible_body"]
 
 
@@ -195,12 +197,13 @@ def test_shapes_that_cannot_be_read_are_none(tmp_path: Path) -> None:
         scaled(link, 1e3, 1e3)
     text = urdf_of(links).replace('<box size="', '<mesh filename="missing.stl" was="', 2)
     (tmp_path / "arms.urdf").write_text(text, encoding="utf-8")
-    found = of_description(build_robot(RobotSpec(urdf="arms.urdf"), tmp_path))
+    spec = Spec(robot=RobotSpec(urdf="arms.urdf"))
+    found = of_description(build_robot(spec.robot, tmp_path), spec)
     assert [each.joints for each in found] == [("to_left_1", "to_right_1")]
     # Rows of inspect without data.
     (tmp_path / "arms.urdf").write_text(urdf_of(arms(5)), encoding="utf-8")
     found = inspect(load_case({"robot": {"urdf": str(tmp_path / "arms.urdf")}}))
-    assert tuple(each.name for each in found.results) == NAMES[:4]
+    assert tuple(each.name for each in found.results) == names()[:4]
     assert all(each.status == "ok" for each in found.results)
 
 

@@ -12,12 +12,13 @@ import pytest
 
 from excite_cli.checks import rows
 from excite_cli.checks.all_checks import look
-from excite_cli.checks.own import GROUP, own_checks
+from excite_cli.checks.catalogue import CHECKS
 from excite_cli.config.load_spec import load_spec
 from excite_cli.errors import ExciteWarning
 from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing
 from tests.effects import own_package
+from tests.registries import forget
 from tests.simulation.arms import arm, played
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "check.md"
@@ -31,15 +32,15 @@ def block(language: str) -> str:
 
 @pytest.fixture(autouse=True)
 def _read_anew() -> Iterator[None]:
-    own_checks.cache_clear()
+    forget(CHECKS)
     yield
-    own_checks.cache_clear()
+    forget(CHECKS)
 
 
 def install(folder: Path, code: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """What an installer leaves of the package of the page."""
-    points = tomllib.loads(block("toml"))["project"]["entry-points"][GROUP]
-    own_package.install(folder, code, points, "my_checks", GROUP)
+    points = tomllib.loads(block("toml"))["project"]["entry-points"][CHECKS.group]
+    own_package.install(folder, code, points, "my_checks", CHECKS.group)
     monkeypatch.syspath_prepend(folder)
     monkeypatch.delitem(sys.modules, "my_checks", raising=False)
 
@@ -61,7 +62,7 @@ def test_the_check_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     ("code", "why"),
     [
         ("Supply = 3", "it is not a subclass of Check"),
-        ("from excite_cli.checks.own import Check\nclass Supply(Check): name = 'x'", "lacks look"),
+        ("from excite_cli.checks.base import Check\nclass Supply(Check): name = 'x'", "lacks look"),
         ("import nothing_of_that_name", "cannot be loaded"),
     ],
 )
@@ -70,4 +71,4 @@ def test_one_that_cannot_be_used_is_set_aside(
 ) -> None:
     install(tmp_path, code, monkeypatch)
     with pytest.warns(ExciteWarning, match=f"check 'supply'.*set aside.*{why}"):
-        assert own_checks() == ()
+        assert not CHECKS.foreign

@@ -5,12 +5,9 @@ import json
 import pytest
 import typer.main
 
-from excite_cli.api.exporting import MODELS
 from excite_cli.api.showing import Answer, Table
 from excite_cli.cli.app import app
 from excite_cli.cli.completion import (
-    MODEL_FORMATS,
-    MOTION_FORMATS,
     complete_effect,
     complete_format,
     complete_key,
@@ -21,7 +18,8 @@ from excite_cli.cli.exit_status import run_guarded
 from excite_cli.cli.start_line import Best
 from excite_cli.errors import FileError
 from excite_cli.excitation.progress import Figure, Progress, ProgressMeasure, Stage
-from excite_cli.export.motions import MOTION_EXPORTERS
+from excite_cli.export.model_formats import MODEL_FORMATS
+from excite_cli.motion_formats.catalogue import MOTION_FORMATS
 from excite_cli.robot.overview import known_robots
 
 NAME = "a_very_long_name_of_a_joint_that_someone_wants_to_copy"
@@ -61,8 +59,7 @@ def test_every_command_takes_the_flags_of_the_contract() -> None:
 
 def test_completion_knows_robots_formats_kinds_and_keys() -> None:
     assert complete_format("r") == ["ros2", "rosbag2"]
-    assert set(MOTION_FORMATS) == set(MOTION_EXPORTERS)
-    assert set(MODEL_FORMATS) == set(MODELS)
+    assert complete_format("") == [*MOTION_FORMATS.members, *MODEL_FORMATS]
     assert "ur10" in complete_robot("ur")
     assert complete_effect("spr") == ["spring@"]
     assert complete_key("optimizer.max_it") == ["optimizer.max_iterations="]

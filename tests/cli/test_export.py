@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from excite_cli.config.load_spec import load_spec
-from excite_cli.measurement.motion_files import read_own_motion
+from excite_cli.motion_formats.catalogue import read_own_motion
 from excite_cli.robot.model import build_robot
 from excite_cli.store.result_file import read_result
 from excite_cli.trajectory.fourier import FourierTrajectory

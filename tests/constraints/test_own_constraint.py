@@ -8,7 +8,7 @@ from excite_cli.report.motion_figure import draw_margins
 from excite_cli.report.motion_section import motion_section
 
 from excite_cli.config.load_spec import parse_spec, spec_as_yaml
-from excite_cli.constraints.catalogue import OWN
+from excite_cli.constraints.catalogue import CONSTRAINTS
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.admissible import path_of, worst_margins
 from excite_cli.excitation.inspection import Look, inspect
@@ -28,7 +28,7 @@ LIMIT = 4.0  # [W]
 @pytest.fixture(scope="module", autouse=True)
 def catalogue_line() -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(OWN, "joint_power", JointPower)
+        patch.setitem(CONSTRAINTS.members, "joint_power", JointPower)
         yield
 
 
@@ -89,6 +89,10 @@ def test_reports_and_views_show_it(kept: tuple[Problem, Result]) -> None:
     ("own", "words"),
     [
         ("{joint_powr: {limit: 3}}", "own.joint_powr: there is no .* Did you mean 'joint_power'"),
+        (
+            "{torque: {scale: 1}}",
+            "own.torque: there is no constraint 'torque'.* Known: joint_power",
+        ),
         ("{joint_power: {limits: 3}}", "own.joint_power: .*'limit'.* Settings: limit"),
         ("{joint_power: {}}", "own.joint_power: missing .*'limit'"),
     ],
@@ -96,3 +100,17 @@ def test_reports_and_views_show_it(kept: tuple[Problem, Result]) -> None:
 def test_wrong_names_are_told(own: str, words: str) -> None:
     with pytest.raises(ConfigError, match=words):
         _problem(f"constraints.own={own}")
+
+
+def test_without_any_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also not one with a section of its own."""
+    monkeypatch.delitem(CONSTRAINTS.members, "joint_power")
+    with pytest.raises(ConfigError, match=r"own\.torque: there is no constraint .* Known: none"):
+        _problem("constraints.own={torque: {scale: 1}}")
+
+
+def test_two_of_one_name_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Verdicts go by name: one would hide the other."""
+    monkeypatch.setattr(JointPower, "name", "joint_torque")
+    with pytest.raises(ConfigError, match="2 are called 'joint_torque'"):
+        _problem("constraints.own.joint_power.limit=3")

@@ -23,7 +23,7 @@ def test_unknown_kind_suggests_the_nearest() -> None:
 
 def _all_members() -> list:
     members = []
-    for kind in CRITERIA:
+    for kind in CRITERIA.members:
         criterion = build_criterion(CriterionSpec(kind=kind))
         members += [criterion, *criterion.continuation()]
     return members
@@ -67,7 +67,7 @@ def test_smooth_form_bounds_the_condition_number(seed: int, size: int, p: float)
 
 
 def test_continuation_ends_at_or_near_what_was_asked() -> None:
-    for kind in CRITERIA:
+    for kind in CRITERIA.members:
         criterion = build_criterion(CriterionSpec(kind=kind, smoothing=32.0))
         steps = criterion.continuation()
         assert all(step.smooth for step in steps)
@@ -109,7 +109,7 @@ def _planned(kind: str) -> tuple[Problem, float]:
 
 
 def test_a_plan_by_it_is_better_by_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(CRITERIA, "worst_three", lambda spec: WorstThree())
+    monkeypatch.setitem(CRITERIA.members, "worst_three", WorstThree)
     problem, reached = _planned("worst_three")
     assert isinstance(problem.criterion, WorstThree)
     _, by_another = _planned("condition_number")

@@ -23,7 +23,7 @@ from excite_cli.effects.asymmetric_friction import AsymmetricFriction
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.effects.coulomb_friction import CoulombFriction
-from excite_cli.effects.seen import Seen
+from excite_cli.effects.judgement import Seen
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.measurement.run_identity import RunId

@@ -14,7 +14,7 @@ from excite_cli.diagnosis.training import TrainingData
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import catalogue
-from excite_cli.effects.seen import Seen
+from excite_cli.effects.judgement import Seen
 from excite_cli.robot.model import Array, build_robot
 from tests.diagnosis.explicit_data import prepared
 from tests.effects.motions import signals_at

@@ -13,10 +13,11 @@ import pytest
 
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect
-from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION, catalogue, kind_named
+from excite_cli.effects.catalogue import EFFECTS, EVERYDAY, EVERYDAY_FRICTION, kind_named
 from excite_cli.measurement.dataset import Dataset
 from tests.diagnosis.simulated_arm import ELBOW, ROBOT, PlantedEffect, planted, played, told
 from tests.effects import own_package
+from tests.registries import forget
 
 OWN = "roller_friction"
 RIVALS = ("viscous_friction", "coulomb_friction", "asymmetric_friction", "spring")
@@ -31,9 +32,9 @@ def own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[type[Effect]]:
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(folder)
         patch.delitem(sys.modules, own_package.MODULE, raising=False)
-        catalogue.cache_clear()
+        forget(EFFECTS)
         yield kind_named(OWN)
-    catalogue.cache_clear()
+    forget(EFFECTS)
 
 
 @pytest.fixture(scope="module")

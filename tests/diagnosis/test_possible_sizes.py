@@ -11,8 +11,8 @@ from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.possible_sizes import PossibleSizes
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
+from excite_cli.effects.judgement import Seen
 from excite_cli.effects.payload import Payload
-from excite_cli.effects.seen import Seen
 from excite_cli.robot.model import Array
 
 # A robot on which no size is absurd.

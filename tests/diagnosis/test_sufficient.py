@@ -15,7 +15,7 @@ from excite_cli.diagnosis.possible_sizes import PossibleSizes
 from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.diagnosis.sufficient import those_that_matter, with_everyday
 from excite_cli.effects.base import Effect, Signals
-from excite_cli.effects.seen import Seen
+from excite_cli.effects.judgement import Seen
 from excite_cli.robot.model import Array
 from tests.diagnosis.test_extrapolation import FAST, ROBOT, SLOW, TORQUE, crept, kind, made, usual
 

@@ -89,8 +89,11 @@ def test_contributing_names_what_members_must_have() -> None:
         "constraint": "constraints/base.py",
         "criterion": "criteria/base.py",
         "reader": "measurement/reader.py",
+        "motion format": "motion_formats/base.py",
+        "check": "checks/base.py",
     }.items():
-        (recipe,) = re.findall(rf"## Add an? {heading}\n1\. (.*)", CONTRIBUTING)
+        form = rf"- \*\*An? {heading}\*\* \(`{path}`\): (.*?\.)(?: |\n)"
+        (recipe,) = re.findall(form, CONTRIBUTING)
         text = (ROOT / "excite_cli" / path).read_text(encoding="utf-8")
         defined = {
             node.name if isinstance(node, ast.FunctionDef) else ast.unparse(node.target)
@@ -98,8 +101,9 @@ def test_contributing_names_what_members_must_have() -> None:
             if isinstance(node, ast.FunctionDef | ast.AnnAssign)
         }
         required = set(re.findall(r"abstractmethod\n    def (\w+)", text))
-        words = set(re.findall(r"`(\w+)`", recipe.partition(":")[2]))
-        assert required <= words <= defined | {"RawRun"}, heading
+        words = set(re.findall(r"`(\w+)`", recipe))
+        others = {"RawRun", "DescriptionCheck", "SetupCheck"}
+        assert required <= words <= defined | others, heading
 
 
 def test_what_is_missing_is_noticed() -> None:

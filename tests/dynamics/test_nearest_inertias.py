@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from excite_cli.dynamics.nearest_inertias import half_of, nearest_inertias
+from excite_cli.dynamics.nearest_inertias import nearest_inertias
 from excite_cli.dynamics.pseudo_inertia import smallest_eigenvalues
+from excite_cli.effects.rare_sizes import half_of
 
 LENGTH = np.array([0.2])
 NONE = np.zeros(0, dtype=np.intp)

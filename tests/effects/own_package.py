@@ -4,7 +4,7 @@ import re
 import tomllib
 from pathlib import Path
 
-from excite_cli.effects.catalogue import GROUP
+from excite_cli.effects.catalogue import EFFECTS
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "effect.md"
 MODULE = "my_effects"
@@ -26,12 +26,14 @@ def code() -> str:
 
 def points() -> dict[str, str]:
     """Its entry points."""
-    found: dict[str, str] = tomllib.loads(blocks("toml")[0])["project"]["entry-points"][GROUP]
+    found: dict[str, str] = tomllib.loads(blocks("toml")[0])["project"]["entry-points"][
+        EFFECTS.group
+    ]
     return found
 
 
 def install(
-    folder: Path, text: str, names: dict[str, str], module: str = MODULE, group: str = GROUP
+    folder: Path, text: str, names: dict[str, str], module: str = MODULE, group: str = EFFECTS.group
 ) -> None:
     """What an installer leaves of a package with one module."""
     (folder / f"{module}.py").write_text(text, encoding="utf-8")

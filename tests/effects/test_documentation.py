@@ -9,12 +9,13 @@ import pytest
 
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.effects.base import Effect
-from excite_cli.effects.catalogue import catalogue, declared_effects
+from excite_cli.effects.catalogue import EFFECTS, catalogue, declared_effects
 from excite_cli.effects.sign import sign_of_width
 from excite_cli.excitation.gradient_check import central_differences, relative_error
 from excite_cli.robot.model import Array
 from tests.effects import own_package
 from tests.effects.motions import signals_at, signals_of, states
+from tests.registries import forget
 from tests.robot.random_robots import random_robot
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -23,9 +24,9 @@ PAGE = (DOCS / "effects.md").read_text(encoding="utf-8")
 
 @pytest.fixture(autouse=True)
 def _catalogue_read_anew() -> Iterator[None]:
-    catalogue.cache_clear()
+    forget(EFFECTS)
     yield
-    catalogue.cache_clear()
+    forget(EFFECTS)
 
 
 @pytest.mark.parametrize("name", list(catalogue()))

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 import excite_cli as api
-from excite_cli.effects.catalogue import catalogue, kind_named
+from excite_cli.effects.catalogue import EFFECTS, catalogue, kind_named
 from excite_cli.errors import ConfigError, ExciteWarning
 from tests.effects import own_package
+from tests.registries import forget
 from tests.trust.conftest import SMOKE
 from tests.trust.in_process import excite
 
@@ -55,9 +56,9 @@ FAILING = {
 
 @pytest.fixture(autouse=True)
 def _catalogue_read_anew(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    catalogue.cache_clear()
+    forget(EFFECTS)
     yield
-    catalogue.cache_clear()
+    forget(EFFECTS)
 
 
 @pytest.mark.parametrize("case", UNUSABLE)

@@ -115,7 +115,7 @@ def test_adjoint_block_form_and_differences_agree(
         assert _error(objective, criterion, alpha) < 1e-7
 
 
-@pytest.mark.parametrize("kind", sorted(CRITERIA))
+@pytest.mark.parametrize("kind", sorted(CRITERIA.members))
 @pytest.mark.parametrize("prior", [False, True])
 def test_every_criterion_with_every_continuation(kind: str, prior: bool) -> None:
     robot = random_robot(21, joints=4)

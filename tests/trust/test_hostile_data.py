@@ -20,7 +20,7 @@ from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import FileError
 from excite_cli.measurement import reader
 from excite_cli.measurement.catalogue import read_dataset
-from excite_cli.measurement.motion_files import read_motion
+from excite_cli.motion_formats.catalogue import read_motion
 from excite_cli.store.result_file import read_result
 from tests.trust.refusals import refused
 

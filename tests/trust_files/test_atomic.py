@@ -13,9 +13,9 @@ from excite_cli import atomic
 from excite_cli.atomic import write_atomically, write_folder_atomically
 from excite_cli.disk_cache import store_arrays, stored_arrays
 from excite_cli.errors import FileError
-from excite_cli.export.motions import MOTION_EXPORTERS
 from excite_cli.measurement.hdf5_writer import new_hdf5
-from excite_cli.measurement.timed_motion import TimedMotion
+from excite_cli.motion_formats.catalogue import MOTION_FORMATS
+from excite_cli.motion_formats.timed_motion import TimedMotion
 
 WRITERS = pytest.mark.parametrize("write", [write_atomically, write_folder_atomically])
 Writer = Callable[[Path, Callable[[Path], None]], None]
@@ -131,7 +131,7 @@ def test_a_bag_that_fills_the_disk_is_told_as_any_file(
     t = np.arange(5.0)
     motion = TimedMotion("m", ("a",), t, np.zeros((5, 1)), np.zeros((5, 1)), np.zeros((5, 1)))
     with pytest.raises(FileError, match="bag cannot be written: no space is left on the disk"):
-        MOTION_EXPORTERS["rosbag2"].write(tmp_path / "bag", motion)
+        MOTION_FORMATS.members["rosbag2"]().write(tmp_path / "bag", motion)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -15,14 +15,13 @@ from excite_cli.errors import ConfigError, FileError, MissingExtraError
 from excite_cli.excitation.base_motion import base_motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.start import random_start
-from excite_cli.export.motion_exporter import MotionExporter, joint_trajectory
-from excite_cli.export.motion_rosbag2 import message_of
-from excite_cli.export.motions import MOTION_EXPORTERS
 from excite_cli.export.timed import instants, repeated, timed_motion
 from excite_cli.measurement.csv_table import read_table
-from excite_cli.measurement.motion_bag import MESSAGE
-from excite_cli.measurement.motion_files import read_motion
-from excite_cli.measurement.timed_motion import TimedMotion
+from excite_cli.motion_formats.base import MotionFormat
+from excite_cli.motion_formats.catalogue import MOTION_FORMATS, read_motion
+from excite_cli.motion_formats.joint_trajectory import joint_trajectory
+from excite_cli.motion_formats.rosbag2 import MESSAGE, message_of
+from excite_cli.motion_formats.timed_motion import TimedMotion
 from excite_cli.simulation.mujoco_model import build_plant
 from excite_cli.trajectory.bspline import BSplineTrajectory
 from excite_cli.trajectory.fade import Chain, Segment
@@ -41,18 +40,18 @@ def chain() -> Chain:
     return Chain((Segment("motion_1", FourierTrajectory(4, 0.77), alpha),))
 
 
-EXPORTERS = list(MOTION_EXPORTERS.values())
+FORMATS = [found() for found in MOTION_FORMATS.members.values()]
 
 
-def _written(exporter: MotionExporter, folder: Path, rate: float = 100.0) -> tuple[Path, Any]:
+def _written(exporter: MotionFormat, folder: Path, rate: float = 100.0) -> tuple[Path, Any]:
     timed = timed_motion("motion_1", JOINTS, chain(), rate, False, exporter.whole_nanoseconds)
     path = folder / f"out{exporter.suffix}"
     exporter.write(path, timed)
     return path, timed
 
 
-@pytest.mark.parametrize("exporter", EXPORTERS, ids=MOTION_EXPORTERS)
-def test_the_same_motion_is_read_again(exporter: MotionExporter, tmp_path: Path) -> None:
+@pytest.mark.parametrize("exporter", FORMATS, ids=MOTION_FORMATS.members)
+def test_the_same_motion_is_read_again(exporter: MotionFormat, tmp_path: Path) -> None:
     """Its numbers, and what is between the samples."""
     path, timed = _written(exporter, tmp_path, rate=250.0)
     found, note = read_motion(path, JOINTS)
@@ -70,7 +69,7 @@ def test_the_same_motion_is_read_again(exporter: MotionExporter, tmp_path: Path)
 
 @pytest.mark.parametrize("rate", [100.0, 1000.0])
 def test_speeds_and_accelerations_are_the_derivatives(rate: float, tmp_path: Path) -> None:
-    path, _ = _written(MOTION_EXPORTERS["csv"], tmp_path, rate)
+    path, _ = _written(MOTION_FORMATS.members["csv"](), tmp_path, rate)
     found, _ = read_motion(path, JOINTS)
     assert found.v is not None
     assert found.a is not None
@@ -116,14 +115,14 @@ def test_periods_go_on_without_a_jump_or_are_refused() -> None:
 
 
 def test_the_csv_is_a_table_for_the_reader_of_measured_data(tmp_path: Path) -> None:
-    path, timed = _written(MOTION_EXPORTERS["csv"], tmp_path)
+    path, timed = _written(MOTION_FORMATS.members["csv"](), tmp_path)
     columns = read_table(path).columns
     assert list(columns)[:2] == ["t", "q_shoulder_pan"]
     assert np.array_equal(columns["ddq_on"], timed.a[:, 2])
 
 
 def test_yaml_readers_take_every_number_for_a_number(tmp_path: Path) -> None:
-    path, timed = _written(MOTION_EXPORTERS["ros2"], tmp_path, rate=20.0)
+    path, timed = _written(MOTION_FORMATS.members["ros2"](), tmp_path, rate=20.0)
     text = path.read_text(encoding="utf-8")
     assert "e-0" in text
     tree = yaml.safe_load(text)  # as `ros2 topic pub` reads its argument
@@ -135,7 +134,7 @@ def test_yaml_readers_take_every_number_for_a_number(tmp_path: Path) -> None:
 def test_text_forms_are_valid_messages(source: str, release: str, tmp_path: Path) -> None:
     typesys = pytest.importorskip("rosbags.typesys")
     store = typesys.get_typestore(typesys.Stores[release])
-    path, timed = _written(MOTION_EXPORTERS[source], tmp_path, rate=20.0)
+    path, timed = _written(MOTION_FORMATS.members[source](), tmp_path, rate=20.0)
     text = path.read_text(encoding="utf-8")
     tree = yaml.safe_load(text) if source == "ros2" else json.loads(text)
     if source == "moveit":
@@ -169,8 +168,8 @@ def _same_fields(store: Any, name: str, tree: Any) -> None:
 @pytest.mark.parametrize("name", ["rosbag2", "mcap"])
 def test_bags_hold_one_message_and_are_replaced_whole(name: str, tmp_path: Path) -> None:
     rosbag2 = pytest.importorskip("rosbags.rosbag2")
-    path, timed = _written(MOTION_EXPORTERS[name], tmp_path)
-    MOTION_EXPORTERS[name].write(path, timed)
+    path, timed = _written(MOTION_FORMATS.members[name](), tmp_path)
+    MOTION_FORMATS.members[name]().write(path, timed)
     with rosbag2.Reader(path) as reader:
         (connection,) = reader.connections
         assert (connection.topic, connection.msgtype) == ("/joint_trajectory", MESSAGE)
@@ -182,7 +181,7 @@ def test_bags_hold_one_message_and_are_replaced_whole(name: str, tmp_path: Path)
     other = tmp_path / "folder"
     other.mkdir()
     with pytest.raises(FileError, match="exists and is not a bag"):
-        MOTION_EXPORTERS[name].write(other, timed)
+        MOTION_FORMATS.members[name]().write(other, timed)
 
 
 def test_without_rosbags_there_is_one_message(
@@ -190,7 +189,7 @@ def test_without_rosbags_there_is_one_message(
 ) -> None:
     monkeypatch.setitem(sys.modules, "rosbags.rosbag2", None)
     with pytest.raises(MissingExtraError, match=r"pip install 'excite-cli\[bags\]'"):
-        _written(MOTION_EXPORTERS["rosbag2"], tmp_path)
+        _written(MOTION_FORMATS.members["rosbag2"](), tmp_path)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -227,7 +226,7 @@ def test_the_plan_is_followed(tmp_path: Path) -> None:
     problem, joints = task.problem, task.problem.robot.joint_names
     x = random_start(task, base_motion(task, 1), (1, 1))
     planned = Chain((Segment("motion_1", problem.trajectory, task.coefficients(x)),))
-    exporter = MOTION_EXPORTERS["ros2"]
+    exporter = MOTION_FORMATS.members["ros2"]()
     path = tmp_path / f"m{exporter.suffix}"
     exporter.write(
         path, timed_motion("m", joints, planned, RATE, False, exporter.whole_nanoseconds)

@@ -4,21 +4,20 @@ Its text forms (YAML of `ros2 topic pub`, JSON of MoveIt's RobotTrajectory) and 
 have the same fields. `time_from_start` counts whole nanoseconds.
 """
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from excite_cli.config.plain_yaml import parse_plain
 from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Array
-from excite_cli.measurement.motion_reader import MotionReader, text_of
 from excite_cli.measurement.reader import check_values
-from excite_cli.measurement.timed_motion import TimedMotion
+from excite_cli.motion_formats.timed_motion import TimedMotion
 
+MAX_TEXT = 200 * 10**6  # bytes of a text file that is held in memory as a tree
 _LONGEST = 10**12  # of whole seconds or nanoseconds
+_NANO = 10**9  # in a second
 _FIELDS = ("positions", "velocities", "accelerations")
 _SHAPE = "{joint_names: […], points: [{positions: […], time_from_start: {sec: …, nanosec: …}}, …]}"
 
@@ -80,35 +79,42 @@ def _column(path: Path, points: list[Any], field: str, width: int) -> Array | No
         raise FileError(f"{path}: {field} are not all numbers: {error}.") from error
 
 
-# Motions as YAML of a JointTrajectory message, as `ros2 topic pub` takes it.
+def joint_trajectory(motion: TimedMotion) -> dict[str, Any]:
+    """The message as dictionaries and lists, every field of its definition in order."""
+    stamps = np.rint(motion.t * _NANO).astype(np.int64).tolist()
+    rows = zip(stamps, *(x.tolist() for x in motion.states), strict=True)
+    return {
+        "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+        "joint_names": list(motion.joint_names),
+        "points": [
+            {
+                "positions": q,
+                "velocities": v,
+                "accelerations": a,
+                "effort": [],
+                "time_from_start": {"sec": stamp // _NANO, "nanosec": stamp % _NANO},
+            }
+            for stamp, q, v, a in rows
+        ],
+    }
 
 
-class MotionRos2(MotionReader):
-    """`.yaml`."""
+def text_of(path: Path) -> str:
+    """The text of a file of limited size.
 
-    title = "ROS 2 YAML"
-    suffixes = (".yaml", ".yml")
-
-    def read(self, path: Path) -> TimedMotion:
-        """The first document of the file."""
-        return motion_of(path, parse_plain(text_of(path), str(path)))
-
-
-# Motions as JSON of moveit_msgs/msg/RobotTrajectory, or of a JointTrajectory alone.
-
-
-class MotionMoveit(MotionReader):
-    """`.json`."""
-
-    title = "MoveIt JSON"
-    suffixes = (".json",)
-
-    def read(self, path: Path) -> TimedMotion:
-        """The field `joint_trajectory`, if there is one, else the whole."""
-        try:
-            tree = json.loads(text_of(path))
-        except (ValueError, RecursionError) as error:
-            raise FileError(f"{path} is not valid JSON: {error}.") from error
-        if isinstance(tree, dict) and "joint_trajectory" in tree:
-            tree = tree["joint_trajectory"]
-        return motion_of(path, tree)
+    Raises
+    ------
+    FileError
+        It is too large, no text in UTF-8, or cannot be read.
+    """
+    try:
+        if path.stat().st_size > MAX_TEXT:
+            raise FileError(
+                f"{path} is larger than {MAX_TEXT // 10**6} MB. Take CSV or .npz for so long a "
+                "motion."
+            )
+        return path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise FileError(f"{path} cannot be read: {error.strerror or error}.") from error
+    except UnicodeDecodeError as error:
+        raise FileError(f"{path} is not a text in UTF-8: {error}.") from error

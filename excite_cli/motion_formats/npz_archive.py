@@ -1,4 +1,4 @@
-"""Readers of motion files, and the one way from such a file to a `TimedMotion`."""
+"""NumPy archive: t (T,), q, v, a (T, n), joint_names (n,); numbers and text, no pickles."""
 
 import zipfile
 from pathlib import Path
@@ -7,22 +7,16 @@ from typing import Any
 import numpy as np
 
 from excite_cli.errors import ExciteError, FileError
-from excite_cli.given_files import require_stored
 from excite_cli.measurement.dataset import Array
-from excite_cli.measurement.joint_trajectory import MotionMoveit, MotionRos2
-from excite_cli.measurement.motion_bag import MotionBag
-from excite_cli.measurement.motion_csv import MotionCsv
-from excite_cli.measurement.motion_reader import MotionReader
 from excite_cli.measurement.reader import MAX_VALUES, check_unpacked
-from excite_cli.measurement.timed_motion import TimedMotion, arranged, checked
+from excite_cli.motion_formats.base import MotionFormat
+from excite_cli.motion_formats.timed_motion import TimedMotion
 
-# Motions as NumPy archives: t (T,), q, v, a (T, n) and joint_names (n,), without pickles.
 
-
-class MotionNpz(MotionReader):
+class NpzArchive(MotionFormat):
     """`.npz`, packed or not."""
 
-    title = "NumPy"
+    name, title = "npz", "NumPy"
     suffixes = (".npz",)
 
     def read(self, path: Path) -> TimedMotion:
@@ -59,6 +53,13 @@ class MotionNpz(MotionReader):
         assert q is not None
         return TimedMotion(path.stem, tuple(str(name) for name in names.ravel()), t, q, v, a)
 
+    def fill(self, path: Path, motion: TimedMotion) -> None:
+        """Packed."""
+        q, v, a = motion.states
+        names = np.array(motion.joint_names, dtype=np.str_)
+        with path.open("wb") as file:
+            np.savez_compressed(file, t=motion.t, q=q, v=v, a=a, joint_names=names)
+
 
 def _array(path: Path, archive: zipfile.ZipFile, name: str, kinds: str) -> Any:
     """One array, once its header is known to claim no more than the archive holds."""
@@ -81,46 +82,3 @@ def _array(path: Path, archive: zipfile.ZipFile, name: str, kinds: str) -> Any:
     with archive.open(member) as file:
         array: Array = np.lib.format.read_array(file, allow_pickle=False)
     return array
-
-
-MOTION_READERS: tuple[MotionReader, ...] = (
-    MotionCsv(),
-    MotionNpz(),
-    MotionRos2(),
-    MotionMoveit(),
-    MotionBag(),
-)
-
-
-def motion_reader_for(path: Path, measured: tuple[str, ...] = ("tau",)) -> MotionReader | None:
-    """The reader of a motion file; None for what is none, as data with columns `measured` ….
-
-    Raises
-    ------
-    FileError
-        There is no such file.
-    """
-    require_stored(path)
-    return next((reader for reader in MOTION_READERS if reader.recognises(path, measured)), None)
-
-
-def read_motion(path: Path, joints: tuple[str, ...]) -> tuple[TimedMotion, str]:
-    """The motion of a file with columns in the order of `joints`, and a note (or nothing).
-
-    Raises
-    ------
-    FileError
-        The file is missing, damaged, of no known format, or moves other joints.
-    MissingExtraError
-        A bag, and the library for bags is not installed.
-    """
-    return arranged(path, read_own_motion(path), joints)
-
-
-def read_own_motion(path: Path) -> TimedMotion:
-    """The motion of a file with the columns that it has; errors as `read_motion`."""
-    reader = motion_reader_for(path)
-    if reader is None:
-        known = "; ".join(f"{each.title}: {', '.join(each.suffixes)}" for each in MOTION_READERS)
-        raise FileError(f"{path} is of no format that holds motions. Read are {known}.")
-    return checked(path, reader.read(path))

@@ -8,17 +8,25 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
-from excite_cli.export.motion_exporter import MotionExporter, joint_trajectory
-from excite_cli.measurement.timed_motion import TimedMotion
+from excite_cli.config.plain_yaml import parse_plain
+from excite_cli.motion_formats.base import MotionFormat
+from excite_cli.motion_formats.joint_trajectory import joint_trajectory, motion_of, text_of
+from excite_cli.motion_formats.timed_motion import TimedMotion
 
 
-class Ros2Exporter(MotionExporter):
+class Ros2Yaml(MotionFormat):
     """`ros2 topic pub --once /topic trajectory_msgs/msg/JointTrajectory "$(cat FILE)"`."""
 
-    name, suffix = "ros2", ".yaml"
+    name, title = "ros2", "ROS 2 YAML"
+    suffixes = (".yaml", ".yml")
     whole_nanoseconds = True
 
-    def _write(self, path: Path, motion: TimedMotion) -> None:
+    def read(self, path: Path) -> TimedMotion:
+        """The first document of the file."""
+        return motion_of(path, parse_plain(text_of(path), str(path)))
+
+    def fill(self, path: Path, motion: TimedMotion) -> None:
+        """Line by line."""
         tree = joint_trajectory(motion)
         stamp = tree["header"]["stamp"]
         with path.open("w", encoding="utf-8", newline="\n") as file:

@@ -1,5 +1,6 @@
 """Motions as CSV: `t, q_<joint>, …[, dq_<joint>, …[, ddq_<joint>, …]]`, a row per instant."""
 
+import csv
 import re
 from pathlib import Path
 
@@ -9,17 +10,17 @@ from excite_cli.errors import FileError
 from excite_cli.measurement.csv_reader import CsvReader
 from excite_cli.measurement.csv_table import header_of, read_table
 from excite_cli.measurement.dataset import Array
-from excite_cli.measurement.motion_reader import MotionReader
-from excite_cli.measurement.timed_motion import TimedMotion
+from excite_cli.motion_formats.base import MotionFormat
+from excite_cli.motion_formats.timed_motion import TimedMotion
 
 CHANNELS = ("q", "dq", "ddq")
 _COLUMN = re.compile(r"(ddq|dq|q)(?:_?\[?(?P<number>\d+)\]?|_(?P<name>.+))$")
 
 
-class MotionCsv(MotionReader):
-    """Text tables."""
+class CsvTable(MotionFormat):
+    """Text tables, as spreadsheets have them."""
 
-    title = "CSV"
+    name, title = "csv", "CSV"
     suffixes = CsvReader.suffixes
 
     def recognises(self, path: Path, measured: tuple[str, ...] = ("tau",)) -> bool:
@@ -49,6 +50,14 @@ class MotionCsv(MotionReader):
         q, v, a = matrices
         assert q is not None
         return TimedMotion(path.name.split(".")[0], joints, columns["t"], q, v, a, numbered)
+
+    def fill(self, path: Path, motion: TimedMotion) -> None:
+        """All digits of every number, so that it is read to the same ones."""
+        names = [f"{channel}_{joint}" for channel in CHANNELS for joint in motion.joint_names]
+        rows = np.column_stack([motion.t, *motion.states]).tolist()
+        with path.open("w", encoding="utf-8", newline="\n") as file:
+            csv.writer(file, lineterminator="\n").writerow(["t", *names])
+            file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
 
 
 def _matrix(

@@ -4,14 +4,19 @@ Units: s, rad, rad/s, rad/s² (m for prismatic joints). What comes from a file i
 is used: increasing instants, finite numbers, and columns matched to joints by name.
 """
 
+from __future__ import annotations
+
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from excite_cli.errors import FileError, nearest
-from excite_cli.measurement.dataset import Array
+
+if TYPE_CHECKING:
+    from excite_cli.measurement.dataset import Array
 
 _LARGEST = 1e12  # of any number, as of measured data: squares of larger ones overflow
 _CHANNELS = {"q": "position", "v": "speed", "a": "acceleration"}
@@ -40,6 +45,15 @@ class TimedMotion:
     def duration(self) -> float:
         """[s]."""
         return float(self.t[-1] - self.t[0])
+
+    @property
+    def states(self) -> tuple[Array, Array, Array]:
+        """q, v, a (T, n) of a motion that has them all; FileError if it has not."""
+        if self.v is None or self.a is None:
+            raise FileError(
+                f"{self.name}: only a motion with speeds and accelerations is exported."
+            )
+        return self.q, self.v, self.a
 
 
 def checked(path: Path, motion: TimedMotion) -> TimedMotion:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from excite_cli.errors import FileError
-from excite_cli.measurement import motion_reader
-from excite_cli.measurement.motion_files import motion_reader_for, read_motion
-from excite_cli.measurement.timed_motion import TimedMotion
+from excite_cli.motion_formats import joint_trajectory
+from excite_cli.motion_formats.catalogue import motion_format_of, read_motion
+from excite_cli.motion_formats.timed_motion import TimedMotion
 
 POINT = "{positions: [1, 2.5], time_from_start: {sec: 0, nanosec: 0}}"
 LATER = "{positions: [2, 1e-05], time_from_start: {sec: 1, nanosec: 500000000}}"
@@ -34,10 +34,10 @@ def test_a_hand_made_table_is_a_motion_and_one_with_torques_is_not(tmp_path: Pat
     assert motion.q.tolist() == [[2, 1], [4, 3]]
     assert (motion.v, motion.a, note) == (None, None, "")
     measured = _file(tmp_path, "d.csv", "t,q_a,tau_a\n0,1,2\n1,2,2\n")
-    assert motion_reader_for(measured) is None
+    assert motion_format_of(measured) is None
     current = _file(tmp_path, "c.csv", "t,q_a,current_a\n0,1,2\n1,2,2\n")
-    assert motion_reader_for(current) is not None
-    assert motion_reader_for(current, ("current",)) is None
+    assert motion_format_of(current) is not None
+    assert motion_format_of(current, ("current",)) is None
 
 
 def test_joints_beyond_the_robots_are_named_and_numbers_go_by_order(tmp_path: Path) -> None:
@@ -113,7 +113,7 @@ def test_files_that_are_not_there_or_too_large(
 ) -> None:
     with pytest.raises(FileError, match="There is no file"):
         read_motion(tmp_path / "m.csv", ("a",))
-    monkeypatch.setattr(motion_reader, "MAX_TEXT", 20)
+    monkeypatch.setattr(joint_trajectory, "MAX_TEXT", 20)
     with pytest.raises(FileError, match="Take CSV or"):
         _read(tmp_path, "m.yaml", GOOD, "a", "b")
 

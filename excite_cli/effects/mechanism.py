@@ -1,0 +1,93 @@
+"""How an effect gets into a simulated robot and into files of models: by default, its formula."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, ClassVar, cast
+
+import numpy as np
+
+from excite_cli.effects.simulated_robot import JOINT_PARTS
+
+if TYPE_CHECKING:
+    from excite_cli.effects.base import Effect
+    from excite_cli.effects.mjcf_parts import MjcfParts
+    from excite_cli.effects.parameter import Parameter
+    from excite_cli.effects.simulated_robot import SimulatedRobot
+    from excite_cli.robot.model import Array
+
+
+class Mechanism:
+    """The effect as a part of a robot that is simulated, or of a file that holds a model."""
+
+    parameters: ClassVar[tuple[Parameter, ...]]
+    shapes: ClassVar[tuple[Parameter, ...]] = ()
+    joints: tuple[int, ...]
+
+    defaults: ClassVar[Mapping[str, float]] = {}  # of `planted`, for what is not named
+    data_defect: ClassVar[bool] = False  # lies in the measurement, not in the robot
+    # The number that people know it by, if that is not the first linear parameter; and settings of
+    # its mechanism that nobody identifies.
+    known_by: ClassVar[str] = ""
+    settings: ClassVar[Mapping[str, float]] = {}
+
+    @classmethod
+    def planted(cls, value: float, others: Mapping[str, float]) -> tuple[dict[str, float], Array]:
+        """Shape and linear parameters for `value` of the first parameter and named `others`.
+
+        What is not named takes its place in `defaults`; without one, the middle (geometric mean)
+        of its usual range if it is a shape, zero if it is a linear parameter.
+        """
+        given = {**cls.defaults, **others}
+        values = np.array([value, *(given.get(p.name, 0.0) for p in cls.parameters[1:])])
+        shape = {
+            p.name: float(given[p.name]) if p.name in given else float(np.sqrt(p.low * p.high))
+            for p in cls.shapes
+        }
+        return shape, values
+
+    def build_into(
+        self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
+    ) -> None:
+        """Put the effect into a simulated robot.
+
+        By default what MuJoCo's joint has a part for becomes that part, a defect of the data
+        changes what is recorded, and all else acts through its own formula. `numbers` are all by
+        name: linear parameters, shape and `settings`.
+        """
+        effect = cast("Effect", self)
+        if self.data_defect:
+            robot.falsify(effect, values)
+            return
+        parts = self.mjcf(values)
+        if parts and JOINT_PARTS.issuperset(parts) and len(self.joints) == 1:
+            robot.add_to_joint(self.joints[0], parts)
+        else:
+            robot.apply(effect, values)
+        robot.tell_controller(effect, values)
+
+    def in_c(self, values: Array, columns: Sequence[str]) -> str:
+        """C statements that add its torque to `tau` (`c_code`); `columns` of the log by name.
+
+        Empty: C has no such effect.
+        """
+        return ""
+
+    def in_c_series(self, values: Array) -> str:
+        """The same for a recorded series as a whole, where an instant alone tells too little.
+
+        `count`, `step`, `q`, `v`, `a`, `load` (rows), `torque` to add to, and `spare` to work in.
+        """
+        return ""
+
+    def urdf(self, values: Array) -> dict[str, float]:
+        """Attributes of the URDF's <dynamics> that hold this effect; empty if none can."""
+        return {}
+
+    def mjcf(self, values: Array) -> dict[str, float]:
+        """Attributes of MuJoCo's <joint> that hold this effect; empty if none can."""
+        return {}
+
+    def put_into_mjcf(self, parts: MjcfParts, values: Array) -> bool:
+        """Add it to a MuJoCo model; false if that cannot hold it."""
+        return len(self.joints) == 1 and parts.add(self.joints[0], self.mjcf(values))

@@ -1,0 +1,1 @@
+"""Formats of motions for controllers: each is read and written."""
