@@ -17,6 +17,7 @@ from excite_cli.diagnosis.words import no_gain_in_words
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.excitation.ending import most_motions as most_motions
+from excite_cli.excitation.expectation import predicting
 from excite_cli.excitation.motion import Doubt
 from excite_cli.excitation.planned_prior import planned_stack
 from excite_cli.excitation.problem import Problem
@@ -234,13 +235,13 @@ def plan_after(
     return following
 
 
-def sizes_asked(given: Sequence[str]) -> dict[str, float]:
-    """Sizes by kind of `KIND=SIZE` texts, for the power of planned motions.
+def sizes_asked(given: Sequence[str], planned: Planned) -> dict[str, float]:
+    """Sizes by kind of `KIND=SIZE` texts, for the power of motions that will be `planned`.
 
     Raises
     ------
     ConfigError
-        A text is not KIND=SIZE, or there is no such kind.
+        A text is not KIND=SIZE, there is no such kind, or no planned motion shows it.
     """
     found = {}
     for text in given:
@@ -253,4 +254,6 @@ def sizes_asked(given: Sequence[str]) -> dict[str, float]:
                 f"--power {text}: give the kind of an effect and a size of its first parameter, "
                 "such as --power load_dependent_friction=0.03."
             ) from None
+    if found:
+        predicting(planned.model if isinstance(planned, NextMotion) else planned, tuple(found))
     return found

@@ -135,7 +135,6 @@ def optimize(
     path = result_path(output, config)
     if quick and restarts is not None:
         raise ConfigError("--quick makes one start: leave --starts out.")
-    sizes = sizes_asked(power or ())
     changes = options.changes(
         overrides,
         seed=seed,
@@ -159,6 +158,7 @@ def optimize(
             planned = load_problem(config, changes, terminal.tell)
         else:
             planned = plan_after(load_case(config, changes), after, terminal.tell)
+        sizes = sizes_asked(power or (), planned)
         with terminal.live("", iterations_of(planned.spec)) as line:
             result = plan(
                 planned,

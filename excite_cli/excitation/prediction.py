@@ -218,7 +218,7 @@ def _possible(
     task: TaskSpec, robot: Robot, declared: Sequence[Effect], more: Sequence[str]
 ) -> list[Effect]:
     """Effects that the robot may have beside the `declared` ones, each in its usual shape."""
-    usual = task.effects
+    usual, asked = task.effects, {*more, *(() if task.effects == "auto" else task.effects)}
     if task.effects == "auto":
         usual = tuple(k for k, kind in catalogue().items() if _may_be_planned_for(kind, robot))
     there, found = {effect.place for effect in declared}, []
@@ -227,9 +227,13 @@ def _possible(
         shape, _ = kind.planted(0.0, {})
         effects = [kind(place, shape) for place in kind.places(robot)]
         reasons = [why_not_planned(each, robot) for each in effects]
-        if effects and all(reasons):
+        if effects and all(reasons) and name in asked:
             raise ConfigError(f"{name}: no planned motion shows it: {reasons[0]}.")
-        found += [each for each in effects if each.place not in there and shows(each, robot)]
+        found += [
+            each
+            for each, reason in zip(effects, reasons, strict=True)
+            if not reason and each.place not in there and shows(each, robot)
+        ]
     return found
 
 

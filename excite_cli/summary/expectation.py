@@ -45,9 +45,9 @@ def _power_table(power: tuple[EffectPower, ...]) -> Table:
     return Table(
         "Effects that these motions would show: size named with 95%, as a share of the joint's "
         "usual torque",
-        ("effect", "from", "on", "to", "on "),
+        ("effect", "size", "most visible on", "size there", "least visible on"),
         tuple(rows),
-        left=("effect", "on", "on "),
+        left=("effect", "most visible on", "least visible on"),
     )
 
 

@@ -159,3 +159,43 @@ def test_two_places_are_one_too_many(excite: Program) -> None:
     both = ("--workers", "2", "--scheduler", "tcp://127.0.0.1:9")
     assert "give one of them" in excite.refused("optimize", SMOKE, *FEW, *both)
     assert list(excite.folder.iterdir()) == []
+
+
+# What the motions are expected to tell.
+
+
+def test_json_has_what_is_predicted_shown_and_not_modelled(two_motions: Run) -> None:
+    answer = json.loads(two_motions.process.stdout)
+    deviations = [motion["predicted_deviation"] for motion in answer["motions"]]
+    assert 0.0 < deviations[1] < deviations[0]
+    kinds = {each["kind"] for each in answer["power"]}
+    assert {"stribeck_friction", "load_dependent_friction", "armature"} <= kinds
+    assert all(each["power"] == 0.95 for each in answer["power"])
+    assert answer["not_modelled"][0].startswith("the floor")
+
+
+def test_a_first_look_makes_one_start_of_few_iterations(excite: Program) -> None:
+    run = excite.good("optimize", SMOKE, "--quick", "--motions", "1", "--json")
+    (motion,) = json.loads(run.stdout)["motions"]
+    assert motion["iterations"] <= 50
+    assert "--quick makes one start" in excite.refused("optimize", SMOKE, "--quick", "--starts", 3)
+
+
+def test_the_power_of_a_size_is_told_for_every_joint(excite: Program) -> None:
+    size = "load_dependent_friction=0.03"
+    run = excite.good("optimize", SMOKE, *BRIEF, "--motions", "1", "--power", size, "--json")
+    power = json.loads(run.stdout)["power"]
+    assert [each["size"] for each in power] == [0.03] * 5
+    assert all(0.0 <= each["power"] <= 1.0 for each in power)
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        ("stribek_friction=1", "--power: there is no effect 'stribek_friction'. Did you mean"),
+        ("stribeck_friction", "--power stribeck_friction: give the kind of an effect and a size"),
+        ("backlash=0.01", "backlash: no planned motion shows it"),
+    ],
+)
+def test_a_power_that_cannot_be_told_says_why(excite: Program, asked: str, told: str) -> None:
+    assert told in excite.refused("optimize", SMOKE, *BRIEF, "--power", asked)

@@ -2,10 +2,6 @@
 
 import numpy as np
 import pytest
-from excite_cli.report.campaign import RebuiltResult
-from excite_cli.report.margin_section import margin_section
-from excite_cli.report.motion_figure import draw_margins
-from excite_cli.report.motion_section import motion_section
 
 from excite_cli.config.load_spec import parse_spec, spec_as_yaml
 from excite_cli.constraints.catalogue import CONSTRAINTS
@@ -14,6 +10,8 @@ from excite_cli.excitation.admissible import path_of, worst_margins
 from excite_cli.excitation.inspection import Look, inspect
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
+from excite_cli.report.margin_chart import margin_charts
+from excite_cli.summary.result_page import margin_section, motion_section
 from excite_cli.trajectory.fade import Segment
 from excite_cli.view.instants import instants_of
 from excite_cli.view.scene import build_scene
@@ -71,12 +69,9 @@ def test_check_judges_it(kept: tuple[Problem, Result]) -> None:
 def test_reports_and_views_show_it(kept: tuple[Problem, Result]) -> None:
     problem, result = kept
     (motion,) = result.motions
-    campaign = RebuiltResult("own.h5", result, problem)
-    assert "Joint power" in str(margin_section(campaign))
-    assert motion_section(campaign).blocks
-    figure = draw_margins(motion, problem)
-    assert [axes.get_title(loc="left") for axes in figure.axes][-1] == "Joint power"
-    assert figure.axes[-1].get_ylabel() == "margin [W]"
+    assert "Joint power" in str(margin_section(result, problem))
+    assert motion_section(result, problem).blocks
+    assert "[W]" in str(margin_charts(problem, motion)["joint_power"])
     segment = Segment("motion_1", problem.trajectory, motion.coefficients)
     shown = instants_of(problem, segment, np.linspace(0.0, 6.0, 5))
     assert shown.margins[-1].name == "joint_power"

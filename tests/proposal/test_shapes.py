@@ -8,7 +8,7 @@ from excite_cli.config.load_spec import parse_spec
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.excitation.problem import build_problem
 from excite_cli.proposal.propose import Request, propose
-from excite_cli.summary.pairs import kept_apart, not_guarded, pairs_data, pairs_in_words
+from excite_cli.summary.pairs import bodies_without_shapes, kept_apart, pairs_data, pairs_in_words
 from tests.proposal.robots import BOX, GOOD, TETRAHEDRON, joint, link, serial, written
 
 # Packages are looked for beside the folders above a robot, where other tests have theirs.
@@ -50,7 +50,7 @@ def test_a_package_that_is_nowhere_costs_its_links_only(tmp_path: Path) -> None:
     assert "checked." in words[1]
     assert "with collision shapes" in words[1]
     assert pairs_data(problem)["links_without_shapes"] == ["palm", "finger"]
-    assert not_guarded(problem) == ["wrist"]
+    assert bodies_without_shapes(problem) == ["wrist"]
 
 
 def test_once_the_package_is_there_the_links_are_guarded(tmp_path: Path) -> None:
@@ -63,7 +63,7 @@ def test_once_the_package_is_there_the_links_are_guarded(tmp_path: Path) -> None
     for name in ("palm", "finger"):
         (meshes / f"{name}.stl").write_text(TETRAHEDRON)
     problem = build_problem(parse_spec(text), tmp_path)
-    assert not_guarded(problem) == []
+    assert bodies_without_shapes(problem) == []
     assert pairs_data(problem)["links_without_shapes"] == []
     assert kept_apart(problem) > kept_apart(bare)
 

@@ -9,8 +9,8 @@ from excite_cli.api.loading import load_problem
 from excite_cli.errors import ConfigError
 from excite_cli.geometry.reasons import Why
 from excite_cli.summary.pairs import (
+    bodies_without_shapes,
     kept_apart,
-    not_guarded,
     pairs_data,
     pairs_in_words,
     unjudged,
@@ -85,7 +85,7 @@ def test_links_without_shapes_are_told(tmp_path: Path) -> None:
                 link.remove(shape)
     (tmp_path / "arm.urdf").write_text(ElementTree.tostring(root, encoding="unicode"))
     problem = load_problem(SMOKE, [f"robot.urdf={tmp_path / 'arm.urdf'}"])
-    assert not_guarded(problem) == ["elbow"]
+    assert bodies_without_shapes(problem) == ["elbow"]
     told = pairs_in_words(problem)
     assert "NOT GUARDED: what moves with elbow (forearm" in told[0]
     assert "checked." in told[1]
@@ -103,11 +103,11 @@ def test_two_arms_with_shapes_on_their_last_links_only(tmp_path: Path) -> None:
     )
     bare = load_problem(config)
     arms = [f"{side}_{k}" for side in ("left", "right") for k in range(1, 7)]
-    assert not_guarded(bare) == arms
+    assert bodies_without_shapes(bare) == arms
     assert kept_apart(bare) == 1
     told = pairs_in_words(bare)
     assert "NOT GUARDED: what moves with left_1 (left_link_1), left_2" in told[0]
     assert told[1] == ("Self-collision: 1 of 1 relevant link pairs with collision shapes checked.")
     shown = load_problem(config, ["constraints.self_collision.shapes=visual"])
-    assert not_guarded(shown) == []
+    assert bodies_without_shapes(shown) == []
     assert kept_apart(shown) > 30

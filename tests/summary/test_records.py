@@ -161,8 +161,8 @@ def test_terminal_and_notebook_show_the_same_cells(
     printed = capsys.readouterr().out
     html = result._repr_html_()
     assert html is not None
-    for answer in (plan_answer(problem, result, "arm.h5"),):
-        for part in answer.parts:
+    for answer in (result_parts(result),):  # what the record alone says
+        for part in answer:
             cells = [c for row in part.rows for c in row] if isinstance(part, Table) else []
             assert all(cell in printed and cell in html for cell in cells)
 
