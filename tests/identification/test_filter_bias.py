@@ -109,7 +109,8 @@ def test_a_filter_that_is_better_than_the_automatic_one_is_not() -> None:
     assert off[0].max() < off[1].max()
 
 
-@pytest.mark.parametrize(("chosen", "count"), [({"position": 0.8}, 1), ({"position": 6.0}, 0)])
+# Of 0.8 Hz the model is off by three times the torque, and what is found depends on rounding.
+@pytest.mark.parametrize(("chosen", "count"), [({"position": 1.0}, 1), ({"position": 6.0}, 0)])
 def test_a_diagnosis_names_it_too(chosen: dict, count: int) -> None:
     case, spec = _played(1, 2e-5), _spec(chosen)
     few = spec.diagnosis.model_copy(update={"kinds": ("torque_offset", "spring")})
