@@ -56,6 +56,7 @@ from excite_cli.effects.catalogue import (
     declared_effects,
 )
 from excite_cli.errors import ExciteError
+from excite_cli.fields import data_of
 from excite_cli.identification.prepare import prepare
 from excite_cli.identification.processing import Processing
 from excite_cli.measurement.dataset import Dataset
@@ -153,7 +154,7 @@ def outcome_of(seed: int, index: int, deck: str) -> Outcome:
     return judge(seed, index, deck).outcome
 
 
-def data_of(case: Case) -> Recorded:
+def records_of(case: Case) -> Recorded:
     """What was recorded; of cases whose simulation adds the noise, it is not known."""
     if case.data is not None:
         return Recorded(case.data, case.data, {})
@@ -167,7 +168,7 @@ def data_of(case: Case) -> Recorded:
 
 def _judged(outcome: Outcome, case: Case, deck: Deck) -> Judged:
     _describe(outcome, case)
-    data = _timed(outcome, "simulate", lambda: data_of(case))
+    data = _timed(outcome, "simulate", lambda: records_of(case))
     if deck.beside == "truth":
         data = replace(data, dataset=_checked(data.dataset, case))
         raise_for_errors(data.dataset)
@@ -366,9 +367,9 @@ def _describe(outcome: Outcome, case: Case) -> None:
 
 def _fill(outcome: Outcome, found: Diagnosis, answer: Answer, result: Score, deck: Deck) -> None:
     for each, judged in zip(found.effects, result.names, strict=True):
-        evidence = {name: value for name, value in asdict(each).items() if name != "effect"}
-        outcome.named.append({**asdict(each.effect), **evidence, "judged": judged})
-    outcome.unexplained = [asdict(each) for each in found.excess_residuals if each.certain]
+        evidence = data_of(each)
+        outcome.named.append({**evidence.pop("effect"), **evidence, "judged": judged})
+    outcome.unexplained = [data_of(each) for each in found.excess_residuals if each.certain]
     outcome.left = sorted(answer.said)
     outcome.found, outcome.right, outcome.wrong = list(result.found), result.right, result.wrong
     outcome.detected, outcome.seen, outcome.extra = result.detected, result.there, result.extra

@@ -18,7 +18,7 @@ from benchmarks.battery.campaigns import (
 from benchmarks.battery.cases import Case
 from benchmarks.battery.decks import DECKS
 from benchmarks.battery.instruments import Instruments, recorded
-from benchmarks.battery.judge import Judged, Outcome, data_of, judge, rests
+from benchmarks.battery.judge import Judged, Outcome, judge, records_of, rests
 from benchmarks.battery.outside import solid
 from benchmarks.battery.tables import failures, groups, rates, verdict
 from excite_cli.dynamics.regressor import standard_parameters
@@ -145,7 +145,7 @@ def test_a_case_from_its_making_to_its_score(clean: tuple[Judged, Case]) -> None
 
 def test_a_rest_that_is_large_is_seen_by_the_truth(clean: tuple[Judged, Case]) -> None:
     judged, case = clean
-    data = data_of(case)
+    data = records_of(case)
     quiet = replace(data, noise={name: noise / 4 for name, noise in data.noise.items()})
     assert judged.diagnosis is not None
     loud = rests(case, quiet, judged.diagnosis)

@@ -60,7 +60,7 @@ def test_what_only_comes_near_is_told_as_an_approximation() -> None:
     assert "spring" in {each["kind"] for each in found.named}
     for each in found.named:  # a wave beside the line comes nearer still, and is no better a name
         assert each["judged"] == "approximation"
-        assert each["approximates"] == "a function of q[panda_joint4]"
+        assert each["approximates"]["covariates"] == ["q[panda_joint4]"]
 
 
 def test_a_sensor_that_saturates_hides_nothing_else_of_its_joint(excite: Installed) -> None:
