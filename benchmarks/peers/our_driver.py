@@ -23,7 +23,7 @@ from excite_cli.criteria.base import Criterion
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import Regressor
 from excite_cli.errors import NoAdmissibleMotionError
-from excite_cli.excitation.objective import Objective, Spectrum
+from excite_cli.excitation.objective import Evaluation, Objective
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.sequence import generate_motion
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
@@ -54,11 +54,9 @@ class TimedObjective(Objective):
 
     clock: Clock
 
-    def value_and_gradient(
-        self, coefficients: Array, criterion: Criterion
-    ) -> tuple[float, Array, Spectrum]:
-        found = super().value_and_gradient(coefficients, criterion)
-        self.clock.note(found[2].condition_number, coefficients)
+    def evaluation(self, coefficients: Array, criterion: Criterion) -> Evaluation:
+        found = super().evaluation(coefficients, criterion)
+        self.clock.note(found.spectrum.condition_number, coefficients)
         return found
 
 
@@ -70,18 +68,20 @@ class DifferencedObjective(TimedObjective):
 
     free: Array
 
-    def value_and_gradient(
-        self, coefficients: Array, criterion: Criterion
-    ) -> tuple[float, Array, Spectrum]:
+    def evaluation(self, coefficients: Array, criterion: Criterion) -> Evaluation:
         spectrum = self.spectrum(self.block(coefficients))
         value = criterion.value(spectrum.sigma)
         self.clock.note(spectrum.condition_number, coefficients)
-        slopes = np.empty((self.free.shape[1], coefficients.shape[1]))
-        for direction, joint in np.ndindex(*slopes.shape):
-            moved = coefficients.copy()
-            moved[:, joint] += STEP * self.free[:, direction]
-            slopes[direction, joint] = (self.value(moved, criterion) - value) / STEP
-        return value, np.linalg.pinv(self.free).T @ slopes, spectrum
+
+        def differences() -> Array:
+            slopes = np.empty((self.free.shape[1], coefficients.shape[1]))
+            for direction, joint in np.ndindex(*slopes.shape):
+                moved = coefficients.copy()
+                moved[:, joint] += STEP * self.free[:, direction]
+                slopes[direction, joint] = (self.value(moved, criterion) - value) / STEP
+            return np.asarray(np.linalg.pinv(self.free).T @ slopes)
+
+        return Evaluation(value, spectrum, differences)
 
 
 @dataclass(frozen=True, repr=False)

@@ -158,7 +158,7 @@ def plan(
 
     read = inputs_of(model, priors, starts, following.name if following else None)
     with held_result(path, overwrite, resume, read):
-        tell_idle(1 if workers is None else workers.count, model.spec.optimizer.restarts, tell)
+        tell_idle(1 if workers is None else workers.count, model.restarts, tell)
         result = _begun(model, following, priors, path if resume else None, tell)
         segments = load_motions(model, starts, tell=tell)
         return continue_run(

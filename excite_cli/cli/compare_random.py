@@ -79,7 +79,7 @@ def compare_random(
         if optimized is not None:
             result = optimized_for(problem, optimized)
         else:
-            with terminal.live("optimising", iterations_of(problem.spec)) as line:
+            with terminal.live("optimising", iterations_of(problem)) as line:
                 progress = start_line(line, problem.spec)
                 result = plan(problem, progress=progress, workers=place, tell=lambda note: None)
         with terminal.live("random motions", candidates) as line:

@@ -159,7 +159,7 @@ def optimize(
         else:
             planned = plan_after(load_case(config, changes), after, terminal.tell)
         sizes = sizes_asked(power or (), planned)
-        with terminal.live("", iterations_of(planned.spec)) as line:
+        with terminal.live("", iterations_of(planned)) as line:
             result = plan(
                 planned,
                 priors=prior or (),

@@ -10,9 +10,9 @@ from excite_cli.cli.console import Line
 from excite_cli.config.spec import Spec
 
 if TYPE_CHECKING:
-    from excite_cli.api.planning import Progress
+    from excite_cli.api.planning import Planned, Progress
 if TYPE_CHECKING:
-    from excite_cli.api.planning import Progress
+    from excite_cli.api.planning import Planned, Progress
 
 # The figure of a progress line: where the solver is, and its best within all limits so far.
 
@@ -34,9 +34,9 @@ class Best:
         return f"condition number {figure.value:.2f}{best}"
 
 
-def iterations_of(spec: Spec) -> int:
+def iterations_of(problem: "Planned") -> int:
     """The most that all starts of one motion take."""
-    return spec.optimizer.max_iterations * spec.optimizer.restarts
+    return problem.spec.optimizer.max_iterations * problem.restarts
 
 
 def start_line(show: Line, spec: Spec) -> Callable[[int, "Progress"], None]:

@@ -143,15 +143,18 @@ class OptimizerSpec(Section):
 
     max_seconds: Positive = Field(30.0, description="per start of a motion")
     max_iterations: Integer = Field(1000, ge=1, le=100_000, description="per start of a motion")
-    restarts: Integer = Field(
-        4,
+    restarts: Integer | None = Field(
+        None,
         ge=1,
         le=10_000,
-        description="starts per motion (multi-start with successive halving: half of the starts "
-        "continue after three stages of the search, a quarter of those after four)",
+        description="starts per motion, the best kept; half of them continue after three stages of "
+        "the search, a quarter of those after four, the first one to the end; default: 4, with "
+        "predicted_torque, whose starts end alike, 1",
     )
-    tolerance: Positive = Field(
-        1e-3, description="change of the (logarithmic) criterion over 8 iterations that ends a run"
+    tolerance: Positive | None = Field(
+        None,
+        description="change of the (logarithmic) criterion over 8 iterations that ends a run; "
+        "default: 1e-3, with predicted_torque 3e-3",
     )
     certify: StrictBool = Field(
         True, description="prove the constraints between the instants; false: 1 kHz samples only"

@@ -29,6 +29,10 @@ class Criterion(ABC):
     """Whether σ is of columns combined by the torque that they make at random states."""
     of_work: bool = False
     """Whether these states are of the user's work, and prior knowledge counts as data."""
+    restarts: int = 4
+    """Starts of a motion where the config gives no number."""
+    tolerance: float = 1e-3
+    """Change of log f over 8 iterations that ends a start, where the config gives none."""
     compares_columns: bool = False
     """Whether it is about columns beside each other, so that one alone says nothing."""
 

@@ -13,3 +13,6 @@ class PredictedTorque(TorqueDeviation):
 
     name = "predicted_torque"
     of_work = True
+    # UR10, Panda, TIAGo, Kinova, SO-100 and TALOS' arms, two seeds, three motions: the best of four
+    # starts is 1 to 4 % better than one, for twice the time; so is a tolerance of 1e-3, by 1 %.
+    restarts, tolerance = 1, 3e-3

@@ -52,6 +52,11 @@ class NextMotion(Shown):
         """The resolved problem that the result is kept for."""
         return self.model.spec
 
+    @property
+    def restarts(self) -> int:
+        """Starts of the next motion."""
+        return self.problem.restarts
+
     def outlook(self, coefficients: Sequence[Array]) -> dict[str, Any]:
         """What the motions (coefficients (K, n) each) are expected to show, for `--json`.
 

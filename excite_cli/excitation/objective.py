@@ -7,6 +7,7 @@ triangular factor alone. The spectrum comes from the Gram matrix where that is e
 rounding is ε cond²) and from QR and SVD elsewhere.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,6 +58,15 @@ class Spectrum:
                 ProgressMeasure.TORQUE_DEVIATION, float(np.sqrt(np.sum(self.sigma**-2.0)))
             )
         return Figure(ProgressMeasure.CONDITION_NUMBER, self.condition_number)
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """The criterion of a motion, its spectrum, and on demand its derivative (K, n)."""
+
+    value: float
+    spectrum: Spectrum
+    gradient: Callable[[], Array]
 
 
 class Objective:
@@ -157,15 +167,24 @@ class Objective:
         """Criterion alone."""
         return criterion.value(self.spectrum(self.block(coefficients)).sigma)
 
+    def evaluation(self, coefficients: Array, criterion: Criterion) -> Evaluation:
+        """Criterion and spectrum, and what it takes to get the derivative."""
+        q, v, a = self.basis.states(coefficients)
+        block, seen = self._evaluated(self.basis.times, q, v, a)
+        spectrum = self.spectrum(block)
+
+        def gradient() -> Array:
+            parts = self._by_states(q, v, a, block, spectrum, criterion, seen)
+            return self.basis.pull_back(*parts)
+
+        return Evaluation(criterion.value(spectrum.sigma), spectrum, gradient)
+
     def value_and_gradient(
         self, coefficients: Array, criterion: Criterion
     ) -> tuple[float, Array, Spectrum]:
         """Criterion, its derivative (K, n) with respect to the coefficients, and the spectrum."""
-        q, v, a = self.basis.states(coefficients)
-        block, seen = self._evaluated(self.basis.times, q, v, a)
-        spectrum = self.spectrum(block)
-        parts = self._by_states(q, v, a, block, spectrum, criterion, seen)
-        return criterion.value(spectrum.sigma), self.basis.pull_back(*parts), spectrum
+        found = self.evaluation(coefficients, criterion)
+        return found.value, found.gradient(), found.spectrum
 
     def _by_states(
         self,

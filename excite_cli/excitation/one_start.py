@@ -150,7 +150,7 @@ def _effort(problem: Problem, task: OneStart, first: int) -> Effort:
     if task.found is not None:
         iterations -= task.found.outcome.iterations
         seconds -= task.found.seconds
-    return Effort(max(iterations, 0), max(seconds, 0.0), spec.tolerance, first, task.until)
+    return Effort(max(iterations, 0), max(seconds, 0.0), problem.tolerance, first, task.until)
 
 
 def _after(before: Outcome, report: ProgressCallback) -> ProgressCallback:

@@ -160,6 +160,16 @@ class Problem(Shown):
         """Scale of every column, base parameters first."""
         return np.concatenate([self.weighting.columns, self.extension.scales])
 
+    @property
+    def restarts(self) -> int:
+        """Starts of a motion."""
+        return self.spec.optimizer.restarts or self.criterion.restarts
+
+    @property
+    def tolerance(self) -> float:
+        """Change of the (logarithmic) criterion over 8 iterations that ends a start."""
+        return self.spec.optimizer.tolerance or self.criterion.tolerance
+
     def objective(self, stack: Stack | None = None) -> Objective:
         """The cost of one motion on top of `stack`."""
         parts = (self.robot, self.base, self.weighting, self.cost_basis, stack, self.extension)

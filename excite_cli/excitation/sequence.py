@@ -48,7 +48,7 @@ def generate_motion(
     given: Segment | None = None,
     workers: Workers | None = None,
 ) -> Motion:
-    """Motion `index` on top of `stack`, the best of `optimizer.restarts` starts.
+    """Motion `index` on top of `stack`, the best of several starts.
 
     The first start is made of the motion `given`, if there is one. Starts are spread over
     `workers` (default: done here); the motion is the same wherever they are done.
@@ -111,12 +111,13 @@ def _best_of_starts(
     """The outcome with the lowest criterion, with iterations and evaluations of all starts.
 
     Also what to report of it. Starts are told apart early (successive halving): after some stages
-    the better half goes on, then a quarter of it to the end. Of equal ones the first is taken, so
-    that it does not matter who was ready first. A start that fails is passed over; the last error
+    the better half goes on, then a quarter of it to the end, and the first one in any case, so that
+    several starts are never worse than one. Of equal ones the first is taken, so that it does not
+    matter who was ready first. A start that fails is passed over; the last error
     is raised only if all fail. A `first` motion is gone on with, and begun with anew as well.
     Where the search is interrupted, the outcome is the best so far.
     """
-    restarts = task.problem.spec.optimizer.restarts
+    restarts = task.problem.restarts
     tasks = [OneStart(task.stack, start, (*seed, number)) for number in range(restarts)]
     if first is not None:
         tasks[0] = replace(tasks[0], first=first, begin=solver.polish)
@@ -183,7 +184,8 @@ def _told_apart(
         alive = list(range(len(tasks)))
         for number, stages in enumerate(search.solver.told_apart if len(tasks) > 1 else ()):
             go_on(alive, stages)
-            alive = best(max(2, -(-len(alive) // 2)) if number == 0 else -(-len(alive) // 4))
+            kept = max(2, -(-len(alive) // 2)) if number == 0 else -(-len(alive) // 4)
+            alive = sorted({*best(kept), *(set(alive[:1]) & last.keys())})
         go_on(alive, None)
         while last and all(found.stages is not None for found in last.values()):
             go_on(best(1), None)  # those that were gone on with led nowhere

@@ -5,6 +5,7 @@ the problem's boundary: α = α_0 + N Xᵀ with X = x as (n, K'). Equalities (st
 where) are gone with α_0 and N; without given postures α_0 is zero.
 """
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from excite_cli.constraints.base import Array
 from excite_cli.criteria.base import Criterion
 from excite_cli.dynamics.forward_kinematics import States
-from excite_cli.excitation.objective import Spectrum
+from excite_cli.excitation.objective import Evaluation, Spectrum
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Progress, Stage
 from excite_cli.excitation.residuals import Residuals
@@ -66,13 +67,11 @@ class MotionTask:
         """(K', n) as the ordering of x."""
         return reduced.T.ravel()
 
-    def cost(self, x: Array, criterion: Criterion) -> tuple[float, Array, Spectrum]:
-        """Criterion, its gradient (size,), and the spectrum of the stack."""
+    def evaluation(self, x: Array, criterion: Criterion) -> Evaluation:
+        """Criterion, spectrum of the stack, and on demand the gradient (size,)."""
         self.evaluations += 1
-        value, gradient, spectrum = self.objective.value_and_gradient(
-            self.coefficients(x), criterion
-        )
-        return value, self.flat(self.free.T @ gradient), spectrum
+        found = self.objective.evaluation(self.coefficients(x), criterion)
+        return replace(found, gradient=lambda: self.flat(self.free.T @ found.gradient()))
 
     def states(self, x: Array) -> States:
         """Joint states on the constraint grid."""

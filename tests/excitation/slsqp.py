@@ -237,7 +237,8 @@ class _Run:
             raise _Stopped(Status.TIME_LIMIT)
         states = self.task.states(x)
         values = self.task.values(states)
-        cost, gradient, spectrum = self.task.cost(x, self.criterion)
+        found = self.task.evaluation(x, self.criterion)
+        cost, gradient, spectrum = found.value, found.gradient(), found.spectrum
         self.best.offer(x, values, spectrum)
         self.last = _Point(x.copy(), states, values, cost, gradient, spectrum)
         return self.last

@@ -105,7 +105,7 @@ def test_the_gradient_of_the_cost_with_an_offset(family: str) -> None:
     def cost(at: Array) -> float:
         return task.objective.value(task.coefficients(at), criterion)
 
-    _, gradient, _ = task.cost(x, criterion)
+    gradient = task.evaluation(x, criterion).gradient()
     assert relative_error(gradient, central_differences(cost, x)) < 1e-6
     assert np.allclose(task.variables(task.coefficients(x)), x)
 

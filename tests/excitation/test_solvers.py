@@ -124,7 +124,7 @@ def test_restoration_brings_a_broken_motion_inside(problem: Problem) -> None:
     task = MotionTask(problem)
     x = start(task)
     best = BestAdmissible(task)
-    spectrum = task.cost(x, problem.criterion)[2]
+    spectrum = task.evaluation(x, problem.criterion).spectrum
     best.offer(x, task.values(task.states(x)), spectrum)
     resting = task.variables(problem.still(problem.robot.posture))
     broken = resting + 3.0 * (x - resting)

@@ -19,6 +19,7 @@ iteration costs one Cholesky factor of the number of variables, and no quadratic
 
 import time
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +31,7 @@ from excite_cli.criteria.base import Criterion
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.motion import Outcome
-from excite_cli.excitation.objective import Spectrum
+from excite_cli.excitation.objective import Evaluation, Spectrum
 from excite_cli.excitation.progress import ProgressCallback, Stage, Status
 from excite_cli.excitation.residuals import (
     REACH,
@@ -77,17 +78,29 @@ class _Near:
     rows: ResidualDerivatives
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Point:
-    """A strictly admissible point with all that was computed at it."""
+    """A strictly admissible point with all that was computed at it.
+
+    The gradient (size,) of the criterion is computed where a step ends: most of the points that a
+    search along a line tries are left at once.
+    """
 
     x: Array
     states: States
     values: list[Array]
-    cost: float
-    gradient: Array
-    spectrum: Spectrum
+    found: Evaluation
     merit: float
+
+    @property
+    def spectrum(self) -> Spectrum:
+        """Of all data with this motion."""
+        return self.found.spectrum
+
+    @cached_property
+    def gradient(self) -> Array:
+        """Of the criterion, (size,)."""
+        return self.found.gradient()
 
 
 class InteriorPoint(Solver):
@@ -201,15 +214,15 @@ class _Run:
         values = self.task.values(states)
         if any(value.min() <= 0 for value in values):
             return None
-        cost, gradient, spectrum = self.task.cost(x, criterion)
-        if not np.isfinite(cost):
+        found = self.task.evaluation(x, criterion)
+        if not np.isfinite(found.value):
             return None
         barrier = sum(
             float(_barrier(value[value < reach], reach).sum())
             for value, reach in zip(values, self.reach, strict=True)
         )
-        merit = cost + mu / self.samples * barrier
-        return _Point(x, states, values, cost, gradient, spectrum, merit)
+        merit = found.value + mu / self.samples * barrier
+        return _Point(x, states, values, found, merit)
 
     def iterate(self, point: _Point, criterion: Criterion, mu: float) -> _Point | None:
         """One Newton step with a backtracking search that stays inside; None if it fails."""
