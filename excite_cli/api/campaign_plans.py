@@ -205,5 +205,5 @@ def _efficiency(problem: Problem, result: Result) -> float | None:
     """Of the motions by themselves: how much an instant tells, of what free states could."""
     stack, objective = Stack.empty(problem.columns), problem.objective()
     for motion in result.motions:
-        stack = stack.with_rows(objective.block(motion.coefficients))
+        stack = objective.added_to(stack, motion.coefficients)
     return invariants(problem, stack, design_for(problem)).efficiency

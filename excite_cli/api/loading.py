@@ -199,7 +199,7 @@ def problem_of(case: Problem | Case, tell: Tell = log_note) -> Problem:
 
 
 def _built(spec: Spec, folder: Path, file: Path | None, tell: Tell) -> Problem:
-    work = _work(spec, folder, tell)
+    work = states_of_work(spec, folder, tell)
     problem = replace(build_problem(spec, folder, fit_knowledge(spec, folder), work), file=file)
     for note in problem_notes(problem):
         tell(note)
@@ -208,7 +208,7 @@ def _built(spec: Spec, folder: Path, file: Path | None, tell: Tell) -> Problem:
     return problem
 
 
-def _work(spec: Spec, folder: Path, tell: Tell) -> tuple[Array, Array, Array] | None:
+def states_of_work(spec: Spec, folder: Path, tell: Tell) -> tuple[Array, Array, Array] | None:
     """q, v, a (N, n) of the log or the plan that `task` names; None where it names none.
 
     Raises

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
-from excite_cli.api.loading import Case, inputs_of, load_data
+from excite_cli.api.loading import Case, inputs_of, load_data, states_of_work
 from excite_cli.api.motions import Motions, is_motion, load_motions, tell_doubts
 from excite_cli.api.outputs import held_result
 from excite_cli.api.working import tell_idle
@@ -222,7 +222,8 @@ def plan_after(
             "payload. --after plans for the robot: give the config that was diagnosed."
         )
     read = found if isinstance(found, Diagnosis) else read_diagnosis(Path(found))
-    following = after_diagnosis(read, spec, folder, fit_knowledge(spec, folder))
+    work = states_of_work(spec, folder, tell)
+    following = after_diagnosis(read, spec, folder, fit_knowledge(spec, folder), work)
     following = replace(following, model=replace(following.model, file=problem.file))
     if not isinstance(found, Diagnosis):
         following = replace(following, name=str(found))

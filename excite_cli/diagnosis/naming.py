@@ -3,7 +3,7 @@
 And what the training data say of all these, for the next motion.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -30,6 +30,7 @@ from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.diagnosis.words import joints_in_words
 from excite_cli.effects.base import Place
 from excite_cli.effects.placing import told_on
+from excite_cli.excitation.prediction import may_be_planned_for
 from excite_cli.robot.model import Array
 
 # The way from the declared model to the diagnosis, one effect at a time.
@@ -199,7 +200,9 @@ def information_of(traced: SearchResult, rivals: Sequence[Rival]) -> Information
     for i, record in rivals:
         unique.setdefault(traced.candidates[i].place, (i, record))
     data = replace(traced.data, prior=None, weighed=None)
-    pool = [traced.candidates[i] for i in (*traced.chosen, *(i for i, _ in unique.values()))]
+    rival = [i for i, _ in unique.values()]
+    possible = _possible(traced, {*(effect.place for effect in effects), *unique})
+    pool = [traced.candidates[i] for i in (*traced.chosen, *rival, *possible)]
     gram = data.evidence(pool, traced.noise).grams.total()[:-1, :-1]
     scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     unit = gram / np.outer(scale, scale)
@@ -214,4 +217,20 @@ def information_of(traced: SearchResult, rivals: Sequence[Rival]) -> Information
         ),
         rivals=tuple(record for _, record in unique.values()),
         noise=traced.levels,
+        possible=tuple(
+            record_of(each.effect, model.robot.joint_names, np.zeros(each.width))
+            for each in (traced.candidates[i] for i in possible)
+        ),
     )
+
+
+def _possible(traced: SearchResult, there: Collection[Place]) -> list[int]:
+    """Of every kind that many robots have the first candidate at every place that is not `there`.
+
+    Those of the next motion that are planned for beside what was found.
+    """
+    found: dict[Place, int] = {}
+    for i, each in enumerate(traced.candidates):
+        if may_be_planned_for(type(each.effect), traced.model.robot) and not each.effect.runs:
+            found.setdefault(each.place, i)
+    return [i for place, i in found.items() if place not in there]

@@ -14,13 +14,16 @@ from scipy.linalg import qr
 
 from excite_cli.config.data_spec import EffectSpec
 from excite_cli.config.spec import Spec
+from excite_cli.criteria.catalogue import build_criterion
 from excite_cli.diagnosis.candidates import effect_of
 from excite_cli.diagnosis.records import Diagnosis, EffectRecord
 from excite_cli.diagnosis.separation import DataColumns, separated
 from excite_cli.diagnosis.verdict import HeldOutVerdict
+from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.uncertain_inertias import FitKnowledge
 from excite_cli.errors import FileError
 from excite_cli.excitation.discrimination import SEPARATED, divergences, motions_needed
+from excite_cli.excitation.expectation import predicting
 from excite_cli.excitation.extension import in_words, why_not_planned
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.stack import Stack
@@ -37,7 +40,8 @@ class NextMotion(Shown):
     `prior` are the measured data on the columns of `model`, which is `problem` unless that
     separates effects; then `problem` has the rivals' columns too. `purpose` is `separate` or
     `excite`; `messages` say what is done and why; `name` is the file of the diagnosis, if it was
-    read from one.
+    read from one. `known`: the problem in which torques are predicted, with the data on its
+    columns; None where the data are those of a base as well.
     """
 
     problem: Problem
@@ -45,6 +49,7 @@ class NextMotion(Shown):
     prior: Stack
     purpose: str
     messages: tuple[str, ...]
+    known: tuple[Problem, Stack] | None = None
     name: str = "the diagnosis"
 
     @property
@@ -106,9 +111,15 @@ def next_command(config: str, file: str) -> Command:
 
 
 def plan_after(
-    diagnosis: Diagnosis, spec: Spec, folder: Path, fit: FitKnowledge | None = None
+    diagnosis: Diagnosis,
+    spec: Spec,
+    folder: Path,
+    fit: FitKnowledge | None = None,
+    work: tuple[Array, Array, Array] | None = None,
 ) -> NextMotion:
-    """The problem of `spec` after what `diagnosis` learned; `fit`: of `uncertainty.fit`.
+    """The problem of `spec` after what `diagnosis` learned.
+
+    fit: of `uncertainty.fit`; work: states q, v, a (N, n) of the log or plan that `task` names.
 
     Raises
     ------
@@ -118,7 +129,7 @@ def plan_after(
     robot = build_measured_robot(spec.robot, folder)
     spec = _weighted(diagnosis, spec, robot)
     if robot.base_joints:
-        return _on_a_base(diagnosis, build_problem(spec, folder, fit))
+        return _on_a_base(diagnosis, build_problem(spec, folder, fit, work, possible=()))
     planned, said = [], []
     for record in diagnosis.information.model:
         effect = effect_of(record, robot.joint_names)
@@ -127,24 +138,39 @@ def plan_after(
         else:
             shape = dict(effect.shape)
             planned.append(EffectSpec(kind=effect.kind, joints=record.joints, shape=shape))
-    problem = build_problem(spec.model_copy(update={"effects": tuple(planned)}), folder, fit)
-    columns = DataColumns(diagnosis, problem)
-    prior = columns.factor(problem)
-    pairs = _alias_pairs(diagnosis)
-    wide, reasons = separated(problem, columns, pairs)
-    said += reasons
+    columns = DataColumns(diagnosis, robot, find_base_parameters(robot).rank)
+    spec, of_work = spec.model_copy(update={"effects": tuple(planned)}), _of_work(spec)
+    pairs, wide, plain = _alias_pairs(diagnosis), None, spec
+    if of_work:  # effects that are only possible are no part of a model that is taken apart
+        criterion = spec.criterion.model_copy(update={"kind": "condition_number"})
+        plain = spec.model_copy(update={"criterion": criterion})
+    if pairs or not of_work:
+        problem = build_problem(plain, folder, fit, work)
+        prior = columns.factor(problem)
+        wide, reasons = separated(problem, columns, pairs)
+        said += reasons
+    if wide is None and of_work:
+        problem = build_problem(spec, folder, fit, work, columns.possible)
+        prior = columns.factor(problem)
+    predicted = predicting(problem, possible=columns.possible)
+    known = predicted, columns.factor(predicted)
     if wide is not None:
         assert wide.separation is not None
         names = [" / ".join(d.pair) for d in wide.separation.directions[::2]]
         said.insert(
             0, f"the next motion separates these indistinguishable effects: {'; '.join(names)}"
         )
-        return NextMotion(wide, problem, prior, "separate", tuple(said))
+        return NextMotion(wide, problem, prior, "separate", tuple(said), known)
     why = "all effects are distinguishable" if not pairs else "no motion distinguishes the effects"
-    count = len(problem.extension.effects)
+    count, more = len(planned), len(problem.extension.effects) - len(planned)
     beside = f" with its {count} effect{'s' if count > 1 else ''}" if count else ""
+    beside += f" and {more} that it may have" if more > 0 else ""
     said.insert(0, f"{why}: the next motion excites the model{beside}, on top of the measured data")
-    return NextMotion(problem, problem, prior, "excite", tuple(said))
+    return NextMotion(problem, problem, prior, "excite", tuple(said), known)
+
+
+def _of_work(spec: Spec) -> bool:
+    return build_criterion(spec.criterion).of_work
 
 
 def _weighted(diagnosis: Diagnosis, spec: Spec, robot: Robot) -> Spec:

@@ -231,8 +231,9 @@ class Round:
 class Information:
     """What the training data say, for planning the next motion.
 
-    `factor` R (k, k) with RᵀR = Σ cᵀc of the columns [base parameters, `model` effects, `rivals`],
-    each effect with all its linear parameters in order, rows weighted by 1/noise and whitened.
+    `factor` R (k, k) with RᵀR = Σ cᵀc of the columns [base parameters, `model` effects, `rivals`,
+    `possible`], each effect with all its linear parameters in order, rows weighted by 1/noise and
+    whitened. `possible`: what was tested and not found, of kinds that many robots have.
     `noise` (n,) per moved joint [N·m] belongs to independent samples.
     """
 
@@ -241,6 +242,7 @@ class Information:
     model: tuple[EffectRecord, ...]
     rivals: tuple[EffectRecord, ...]
     noise: Annotated[Array, shape("n", finite=True)]
+    possible: tuple[EffectRecord, ...] = ()
 
 
 OPEN_SETUP = "open_setup"  # the kind of a finding: the set-up is in doubt

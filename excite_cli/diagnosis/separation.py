@@ -28,20 +28,26 @@ _SAME_TORQUE = 1e-8
 class DataColumns:
     """Where every effect stands in the data's factor, by its kind, joints and shape."""
 
-    def __init__(self, diagnosis: Diagnosis, problem: Problem) -> None:
-        information, robot = diagnosis.information, problem.robot
-        self.robot, self.rank = robot, problem.base.rank
+    def __init__(self, diagnosis: Diagnosis, robot: Robot, rank: int) -> None:
+        information = diagnosis.information
+        self.robot, self.rank = robot, rank
         self.triangle = np.asarray(information.factor, dtype=float)
         self.at: dict[tuple[str, ...], NDArray[np.intp]] = {}
         self.rivals: list[Effect] = []
+        self.possible: list[Effect] = []
         self.values: dict[tuple[str, ...], Array] = {}
         first = self.rank
-        for number, record in enumerate((*information.model, *information.rivals)):
+        rivals = len(information.model), len(information.model) + len(information.rivals)
+        for number, record in enumerate(
+            (*information.model, *information.rivals, *information.possible)
+        ):
             effect = effect_of(record, robot.joint_names)
             count = len(effect.parameters)
             self.at[_key(effect, robot)] = np.arange(first, first + count)
             self.values[_key(effect, robot)] = np.asarray(record.values, dtype=float)
-            if number >= len(information.model):
+            if number >= rivals[1]:
+                self.possible.append(effect)
+            elif number >= rivals[0]:
                 self.rivals.append(effect)
             first += count
         if self.triangle.ndim != 2 or self.triangle.shape[1] != first:

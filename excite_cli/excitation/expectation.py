@@ -6,6 +6,7 @@ The same figures whatever the motions were planned for, and with whatever weight
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from excite_cli.effects.base import Effect
 from excite_cli.excitation.power import EffectPower, power_of, sizes_shown
 from excite_cli.excitation.prediction import build_prediction
 from excite_cli.excitation.problem import Problem, acceleration_bounds, on_fine_grid
@@ -27,9 +28,14 @@ class Expectation:
 
 
 def expectation(
-    problem: Problem, result: Result, asked: Mapping[str, float] | None = None
+    problem: Problem,
+    result: Result,
+    asked: Mapping[str, float] | None = None,
+    known: tuple[Problem, Stack] | None = None,
 ) -> Expectation:
     """Of the motions in `result`; `asked`: sizes, by kind, whose power is asked for.
+
+    `known`: a problem with a prediction, and earlier data on its columns.
 
     Raises
     ------
@@ -37,15 +43,15 @@ def expectation(
         No planned motion shows an effect that is asked for.
     """
     asked = asked or {}
-    own = predicting(problem, tuple(asked))
+    start, earlier = known or (problem, result.prior_stack)
+    own = predicting(start, tuple(asked))
     prediction = own.prediction
     assert prediction is not None
-    earlier = result.prior_stack
-    same = own is problem and earlier.factor.shape[1] == own.columns
+    same = own is start and earlier.factor.shape[1] == own.columns
     stack = earlier if same else Stack.empty(own.columns)
     objective, deviations = own.objective(), []
     for motion in result.motions:
-        stack = stack.with_rows(objective.block(motion.coefficients))
+        stack = objective.added_to(stack, motion.coefficients)
         deviations.append(prediction.deviation(stack.factor))
     alpha = problem.spec.diagnosis.significance
     power = tuple(
@@ -60,10 +66,13 @@ def expectation(
     )
 
 
-def predicting(problem: Problem, kinds: Sequence[str] = ()) -> Problem:
+def predicting(
+    problem: Problem, kinds: Sequence[str] = (), possible: Sequence[Effect] | None = None
+) -> Problem:
     """The problem with its prediction, in which these kinds of effects are possible, too.
 
-    Made for another criterion, or without one of them, it gets a prediction beside that.
+    Made for another criterion, or without one of them, it gets a prediction beside that, with the
+    effects `possible` in place of the usual ones.
     """
     there = {effect.kind for effect in problem.extension.effects}
     if problem.prediction is not None and there.issuperset(kinds):
@@ -78,6 +87,7 @@ def predicting(problem: Problem, kinds: Sequence[str] = ()) -> Problem:
         len(problem.cost_basis.times),
         problem.work,
         kinds,
+        possible,
     )
     wide = replace(
         problem,

@@ -49,7 +49,9 @@ class Motion(Shown):
 
     `condition_number` is that of the motion alone, `stacked_condition_number` that of the motion
     with all earlier data, both on the samples of the cost, and `dense_condition_number` the latter
-    on eight times as many (None in files of before). `improved` tells whether the stack became
+    on eight times as many (None in files of before). `predicted_deviation`: where motions are
+    planned for torques of the work, the RMS standard deviation of such a torque after this motion
+    and all before, in units of the noise of a sample. `improved` tells whether the stack became
     better by it; `note` says what else one should know; `certified` which constraints are proved
     at every instant. With a `doubt`, none counts as proved: the motion is another one than that
     which was. `digest` is that of all this (`motion_digest`), from when the motion was finished.
@@ -68,6 +70,7 @@ class Motion(Shown):
     note: str = ""
     certified: dict[str, bool] = field(default_factory=dict)
     dense_condition_number: float | None = None
+    predicted_deviation: float | None = None
     digest: str = ""
     doubt: Doubt = Doubt.NONE
 
@@ -110,6 +113,8 @@ def digest_of(motion: Motion, config: str, robot: str, joints: Sequence[str]) ->
         "certified": {name: bool(proved) for name, proved in motion.certified.items()},
         "margins": {name: _as_stored(worst) for name, worst in motion.margins.items()},
     }
+    if motion.predicted_deviation is not None:
+        about["predicted_deviation"] = float(motion.predicted_deviation)
     return hashlib.sha256(json.dumps(about, sort_keys=True).encode()).hexdigest()
 
 

@@ -107,6 +107,10 @@ class Objective:
         """Weighted and scaled columns (T·R, r) of states (T, n) at equidistant `times`."""
         return self._evaluated(times, q, v, a)[0]
 
+    def added_to(self, stack: Stack, coefficients: Array) -> Stack:
+        """`stack` with the rows of this motion."""
+        return stack.with_rows(self.block(coefficients))
+
     def _evaluated(
         self, times: Array, q: Array, v: Array, a: Array
     ) -> tuple[Array, SeenColumns | None]:
@@ -162,6 +166,15 @@ class Objective:
         """Condition number with all earlier data, cond(C) of Table I."""
         block = self.block(coefficients)
         return self._spectrum(block.T @ block + self._gram_0, block).condition_number
+
+    def figures_of(self, grams: Array) -> Array:
+        """What random motions are chosen by (N,): condition numbers, of Gram matrices (N, r, r)."""
+        squares = np.linalg.eigvalsh(grams)
+        return np.asarray(np.sqrt(squares[:, -1] / np.maximum(squares[:, 0], 1e-300)))
+
+    def deviation_with(self, stack: Stack) -> float | None:
+        """Predicted deviation after the data in `stack`, where motions are planned for that."""
+        return None
 
     def value(self, coefficients: Array, criterion: Criterion) -> float:
         """Criterion alone."""

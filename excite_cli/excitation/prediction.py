@@ -42,6 +42,7 @@ from excite_cli.errors import ConfigError, nearest
 from excite_cli.excitation.extension import Extension, extend, why_not_planned
 from excite_cli.excitation.objective import Objective, Spectrum
 from excite_cli.excitation.reference_states import state_bounds
+from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import Weighting
 from excite_cli.robot.model import Array, Robot
 
@@ -128,17 +129,40 @@ class PredictedTorques(Objective):
         """d^(−½) of the prior and the earlier data."""
         return self._of(self._known.copy()).sigma
 
+    def added_to(self, stack: Stack, coefficients: Array) -> Stack:
+        """With the rows of the base regressor as they are, too."""
+        block = self.block(coefficients)
+        return stack.with_rows(block, self._plain_rows(block))
+
+    def figures_of(self, grams: Array) -> Array:
+        """Predicted deviations (N,)."""
+        root, prior = self.prediction.root, self.prediction.prior
+        covariances = np.linalg.solve(grams + prior.T @ prior, root.T)
+        return np.asarray(np.sqrt(np.einsum("mc,ncm->n", root, covariances)))
+
+    def deviation_with(self, stack: Stack) -> float | None:
+        """RMS standard deviation of the torques of the work, in units of the noise of a sample."""
+        return self.prediction.deviation(stack.factor)
+
     def own_condition_number(self, coefficients: Array) -> float:
-        """Of the base parameters alone, unscaled, rows weighted by 1/noise."""
-        return self._condition_number(self.block(coefficients))
+        """Of the base regressor as it is, as the criterion `condition_number` takes it."""
+        return condition_number(singular_values(self._plain_rows(self.block(coefficients))))
 
     def stacked_condition_number(self, coefficients: Array) -> float:
-        """The same with all earlier data, and without the prior."""
-        return self._condition_number(np.vstack([self.stack.factor, self.block(coefficients)]))
+        """The same with all earlier motions that were planned."""
+        own, earlier = self._plain_rows(self.block(coefficients)), self.stack.plain
+        return condition_number(
+            singular_values(own if earlier is None else np.vstack([earlier, own]))
+        )
 
-    def _condition_number(self, rows: Array) -> float:
-        own = rows[:, : self.base.rank] / self.weighting.columns
-        return condition_number(singular_values(own))
+    def _plain_rows(self, block: Array) -> Array:
+        """Unweighted and unscaled columns (T·R, r) of the base parameters.
+
+        On other instants than those of the cost a motion counts as much as on these.
+        """
+        rows = block.reshape(-1, len(self.weighting.rows), self.size)[:, :, : self.base.rank]
+        rows = rows / self.prediction.weighting.rows[:, None] / self.weighting.columns
+        return rows.reshape(-1, self.base.rank)
 
 
 def build_prediction(
@@ -151,12 +175,14 @@ def build_prediction(
     instants: int,
     work: _States | None = None,
     more: Sequence[str] = (),
+    possible: Sequence[Effect] | None = None,
 ) -> Prediction:
     """The prediction for motions of `duration` [s] whose cost is taken at so many `instants`.
 
     accelerations: bounds (n,), infinite where there is none; work: q, v, a (N, n) of the log or
     the plan that `spec.task` names; without it states of the region are drawn; more: kinds that
-    the robot may have beside those of `spec.task`.
+    the robot may have beside those of `spec.task`; possible: in place of all these, the effects
+    that it may have.
 
     Raises
     ------
@@ -173,7 +199,9 @@ def build_prediction(
     deviations = np.maximum(deviations, 1e-9 * deviations.max())
     rows = np.sqrt(spec.task.rate * duration / instants) / noise
     weighting = Weighting(rows, deviations, "1/noise", "prior deviation")
-    effects = (*declared, *_possible(spec.task, robot, declared, more))
+    if possible is None:
+        possible = _possible(spec.task, robot, declared, more)
+    effects = (*declared, *possible)
     extension = extend(robot, base, weighting, effects, duration, absorbed_too=True)
     shares = _shares(extension)
     sizes = _size_of_usual(extension, drawn, usual)
@@ -220,7 +248,7 @@ def _possible(
     """Effects that the robot may have beside the `declared` ones, each in its usual shape."""
     usual, asked = task.effects, {*more, *(() if task.effects == "auto" else task.effects)}
     if task.effects == "auto":
-        usual = tuple(k for k, kind in catalogue().items() if _may_be_planned_for(kind, robot))
+        usual = tuple(k for k, kind in catalogue().items() if may_be_planned_for(kind, robot))
     there, found = {effect.place for effect in declared}, []
     for name in dict.fromkeys((*usual, *more)):
         kind = kind_named(name, "task.effects")
@@ -237,7 +265,7 @@ def _possible(
     return found
 
 
-def _may_be_planned_for(kind: type[Effect], robot: Robot) -> bool:
+def may_be_planned_for(kind: type[Effect], robot: Robot) -> bool:
     """Whether many robots have it, and the state of one joint says all of its columns.
 
     Of these nothing but the motion decides how well they will be known.

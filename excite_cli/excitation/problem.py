@@ -1,6 +1,7 @@
 """A `Spec` made concrete: robot, base parameters, trajectory, criterion, constraints, grids."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from excite_cli.dynamics.uncertain_inertias import (
     inertia_uncertainty,
 )
 from excite_cli.dynamics.whole_robot import load_parameters
+from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.boundary import Boundary, build_boundary
@@ -193,11 +195,13 @@ def build_problem(
     relative_to: Path | None = None,
     fit: FitKnowledge | None = None,
     work: tuple[Array, Array, Array] | None = None,
+    possible: Sequence[Effect] | None = None,
 ) -> Problem:
     """Resolve `spec`; paths in it start from `relative_to`.
 
     `fit`: what the file named by `uncertainty.fit` knows; `work`: states q, v, a (N, n) of the log
-    or plan that `task` names.
+    or plan that `task` names; `possible`: effects that the robot may have, in place of those that
+    `task` says.
 
     The regressor is extended by the effects that `spec.effects` lists. The friction of the URDF's
     <dynamics> belongs to the declared model of identification, but not to the regressor of a
@@ -231,7 +235,15 @@ def build_problem(
     if criterion.of_work and not of_load:
         bounds = acceleration_bounds(spec, robot)
         prediction = build_prediction(
-            spec, robot, base, effects, bounds, trajectory.duration, len(cost), work
+            spec,
+            robot,
+            base,
+            effects,
+            bounds,
+            trajectory.duration,
+            len(cost),
+            work,
+            possible=possible,
         )
         weighting, extension = prediction.weighting, prediction.extension
     columns = base.rank + len(extension.names)

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.constraints.base import Array
-from excite_cli.criteria.base import condition_number, singular_values
 from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.excitation.base_motion import base_motion
 from excite_cli.excitation.problem import Problem
@@ -33,14 +32,21 @@ _STREAM = 16
 _MOST_CANDIDATES, _MOST_BYTES = 1_000_000, 8 * 10**9
 
 
+FiguresOf = Callable[[Array], Array]  # of Gram matrices (N, r, r), the lowest (N,) is the best
+
+
 @dataclass(frozen=True)
 class RandomMotion:
-    """One selected motion with the condition numbers of Table II."""
+    """One selected motion with the condition numbers of Table II.
+
+    `predicted_deviation`: as that of a `Motion`.
+    """
 
     index: int
     coefficients: Array
     condition_number: float
     stacked_condition_number: float
+    predicted_deviation: float | None = None
 
 
 @dataclass(frozen=True)
@@ -95,7 +101,7 @@ def random_baseline(
         if news.result is not None:
             found, number = news.result
             drawn += number
-            best = min([best, *(each.condition_number for each in found)])
+            best = min([best, *(each.figure for each in found)])
             report(drawn, best)
 
     wanted = candidates
@@ -112,7 +118,7 @@ def random_baseline(
     if not kept:
         raise NoAdmissibleMotionError(f"None of {drawn} random motions is admissible.")
     grams = np.array([each.gram for each in kept])
-    chosen = _select(grams, prior, min(count, len(kept)))
+    chosen = _select(task.objective.figures_of, grams, prior, min(count, len(kept)))
     return RandomBaseline(
         _as_motions(task, [kept[i].x for i in chosen]),
         drawn,
@@ -133,11 +139,11 @@ class _Draw:
 
 @dataclass(frozen=True)
 class _Candidate:
-    """An admissible random motion: free variables, CᵀC, and the condition number with C_0."""
+    """An admissible random motion: free variables, CᵀC, and its figure with C_0."""
 
     x: Array
     gram: Array
-    condition_number: float
+    figure: float
 
 
 def _draw_batch(draw: _Draw, numbers: range, tell: Tell) -> tuple[list[_Candidate], int]:
@@ -150,7 +156,9 @@ def _draw_batch(draw: _Draw, numbers: range, tell: Tell) -> tuple[list[_Candidat
         if x is not None:
             block = task.objective.block(task.coefficients(x))
             gram = block.T @ block
-            found.append(_Candidate(x, gram, _condition(prior + gram)))
+            found.append(
+                _Candidate(x, gram, float(task.objective.figures_of((prior + gram)[None])[0]))
+            )
     return found, len(numbers)
 
 
@@ -195,45 +203,38 @@ def _admissible(task: MotionTask, x: Array) -> bool:
     return True
 
 
-def _condition(gram: Array) -> float:
-    squares = np.linalg.eigvalsh(gram)
-    return float(np.sqrt(squares[-1] / squares[0])) if squares[0] > 0 else float("inf")
+def _best(figures_of: FiguresOf, grams: Array, base: Array) -> tuple[int, float]:
+    """The candidate whose rows are the best on top of `base`."""
+    values = figures_of(base + grams)
+    index = int(np.argmin(values))
+    return index, float(values[index])
 
 
-def _best(grams: Array, base: Array) -> tuple[int, float]:
-    """The candidate that gives the lowest condition number on top of `base`."""
-    squares = np.linalg.eigvalsh(base + grams)
-    smallest = np.maximum(squares[:, 0], 1e-300)
-    ratios = np.sqrt(squares[:, -1] / smallest)
-    index = int(np.argmin(ratios))
-    return index, float(ratios[index])
-
-
-def _select(grams: Array, prior: Array, count: int) -> list[int]:
+def _select(figures_of: FiguresOf, grams: Array, prior: Array, count: int) -> list[int]:
     """Indices of the selected candidates, in the order of the stack."""
     chosen: list[int] = []
     total = prior
     for _ in range(count):
-        index, value = _best(grams, total)
+        index, value = _best(figures_of, grams, total)
         chosen.append(index)
         total = total + grams[index]
     for _ in range(_EXCHANGE_ROUNDS):
         changed = False
         for slot in range(count):
             rest = total - grams[chosen[slot]]
-            index, better = _best(grams, rest)
+            index, better = _best(figures_of, grams, rest)
             if better < value * (1 - 1e-9):
                 chosen[slot], total, value, changed = index, rest + grams[index], better, True
         if not changed:
             break
-    return _ordered(grams, prior, chosen)
+    return _ordered(figures_of, grams, prior, chosen)
 
 
-def _ordered(grams: Array, prior: Array, chosen: list[int]) -> list[int]:
+def _ordered(figures_of: FiguresOf, grams: Array, prior: Array, chosen: list[int]) -> list[int]:
     """The chosen motions so that the stack is as good as can be from the first on."""
     left, order, total = list(chosen), [], prior
     while left:
-        index, _ = _best(grams[left], total)
+        index, _ = _best(figures_of, grams[left], total)
         order.append(left.pop(index))
         total = total + grams[order[-1]]
     return order
@@ -242,15 +243,15 @@ def _ordered(grams: Array, prior: Array, chosen: list[int]) -> list[int]:
 def _as_motions(task: MotionTask, chosen: list[Array]) -> tuple[RandomMotion, ...]:
     motions, stack = [], task.stack
     for number, x in enumerate(chosen, start=1):
-        coefficients = task.coefficients(x)
-        block = task.objective.block(coefficients)
-        stack = stack.with_rows(block)
+        coefficients, objective = task.coefficients(x), task.problem.objective(stack)
+        stack = objective.added_to(stack, coefficients)
         motions.append(
             RandomMotion(
                 number,
                 coefficients,
-                condition_number(singular_values(block)),
-                condition_number(singular_values(stack.factor)),
+                objective.own_condition_number(coefficients),
+                objective.stacked_condition_number(coefficients),
+                objective.deviation_with(stack),
             )
         )
     return tuple(motions)

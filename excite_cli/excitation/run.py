@@ -114,7 +114,7 @@ def _finished(problem: Problem, result: Result) -> Result:
         return result
     stack, objective = result.prior_stack, problem.objective()
     for motion in motions[:-1]:
-        stack = stack.with_rows(objective.block(motion.coefficients))
+        stack = objective.added_to(stack, motion.coefficients)
     return replace(result, motions=motions[:-1], stack=stack)
 
 
@@ -163,7 +163,7 @@ def _running(problem: Problem, result: Result) -> Stack:
         return result.stack
     stack, objective = problem.separation.prior, problem.objective()
     for motion in result.motions:
-        stack = stack.with_rows(objective.block(motion.coefficients))
+        stack = objective.added_to(stack, motion.coefficients)
     return stack
 
 
@@ -176,7 +176,7 @@ def _judged(step: FinishedMotion, model: Problem, stack: Stack) -> FinishedMotio
         stacked_condition_number=objective.stacked_condition_number(alpha),
         dense_condition_number=dense_condition_number(model, stack, alpha),
     )
-    return FinishedMotion(motion, stack.with_rows(objective.block(alpha)))
+    return FinishedMotion(motion, objective.added_to(stack, alpha))
 
 
 def _asked(spec: Spec) -> Spec:

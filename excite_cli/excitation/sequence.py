@@ -89,6 +89,9 @@ def generate_motion(
         margins=worst_margins(problem, coefficients),
         certified=_certified(problem, coefficients),
         dense_condition_number=dense_condition_number(problem, stack, coefficients),
+        predicted_deviation=task.objective.deviation_with(
+            task.objective.added_to(stack, coefficients)
+        ),
         note="; ".join(filter(None, [moved_note(task, start), told, cut])),
     )
 
@@ -276,5 +279,5 @@ def generate_sequence(
         given = starts[index - 1] if index <= len(starts) else None
         told = report(index)
         motion = generate_motion(problem, solver, stack, index, seed, told, given, workers)
-        stack = stack.with_rows(objective.block(motion.coefficients))
+        stack = objective.added_to(stack, motion.coefficients)
         yield FinishedMotion(motion, stack)

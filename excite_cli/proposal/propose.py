@@ -214,6 +214,7 @@ def _draft(
             "base_frequency": round(pace.base_frequency, 6),
         },
         "sampling": {"constraints": {"samples": pace.constraint_samples}},
+        "criterion": {"kind": "predicted_torque"},
         "constraints": constraints,
         "optimizer": {"max_seconds": _SECONDS},
         "sequence": {"motions": _MOTIONS},
@@ -225,6 +226,10 @@ def _draft(
         else f"so that {pace.slowest}, the slowest joint, can use its range"
     )
     comments["trajectory",] = f"{pace.duration:g} s, {why}"
+    comments["criterion", "kind"] = (
+        "predicts torques of the work best (task: a log or plan of it); condition_number: the "
+        "paper's"
+    )
     comments["optimizer",] = "per start of a motion; restarts: 16 may find better motions"
     comments["sequence",] = (
         "each on top of the earlier ones; a diagnosis fits all but the last and judges by that one"

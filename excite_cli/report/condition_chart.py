@@ -90,7 +90,7 @@ def random_stack(result: Result, problem: Problem) -> Array:
     stack = Stack.empty(problem.columns).with_stack(result.prior_stack)
     objective = problem.objective()
     for motion in result.random:
-        stack = stack.with_rows(objective.block(motion.coefficients))
+        stack = objective.added_to(stack, motion.coefficients)
     return stack.factor
 
 

@@ -6,7 +6,7 @@ time. Reading trusts nothing: a foreign or damaged file gives one message.
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -62,6 +62,7 @@ OWN = OwnFile(
     "Result files are written by `excite optimize` and `excite compare-random`.",
     SCHEMA,
 )
+_OPTIONAL = ("dense_condition_number", "predicted_deviation")
 _TABLE = [("motion", "i8"), ("own", "f8"), ("stacked", "f8")]
 
 
@@ -94,9 +95,13 @@ def _write(path: Path, result: Result, problem: Problem) -> None:
             _write_states(group, chosen.coefficients, problem)
             group.attrs["condition_number"] = chosen.condition_number
             group.attrs["stacked_condition_number"] = chosen.stacked_condition_number
+            if chosen.predicted_deviation is not None:
+                group.attrs["predicted_deviation"] = chosen.predicted_deviation
         file["tables/condition_number"] = _table(result.motions)
         file["tables/random"] = _table(result.random)
         file["stack/R"] = result.stack.factor
+        if result.stack.plain is not None:
+            file["stack/R_plain"] = result.stack.plain
         file["stack"].attrs["rows"] = result.stack.rows
         file["stack/R_0"] = result.prior_stack.factor
         file["stack/R_0"].attrs["rows"] = result.prior_stack.rows
@@ -150,8 +155,9 @@ def _write_motion(group: Any, motion: Motion, problem: Problem) -> None:
             ),
         }
     )  # fmt: skip
-    if motion.dense_condition_number is not None:
-        group.attrs["dense_condition_number"] = motion.dense_condition_number
+    for name in _OPTIONAL:
+        if getattr(motion, name) is not None:
+            group.attrs[name] = getattr(motion, name)
     if motion.digest:
         group.attrs["digest"] = digest_with_samples(motion.digest, samples)
 
@@ -225,7 +231,7 @@ def _read(file: Any, path: Path) -> Result:
             _read_motion(file[f"motions/{index}"], index, shape)
             for index in range(1, len(file.get("motions", {})) + 1)
         ),
-        stack=_read_stack(file["stack/R"], file["stack"], columns),
+        stack=_read_stack(file["stack/R"], file["stack"], columns, file.get("stack/R_plain")),
         prior_stack=_read_stack(file["stack/R_0"], file["stack/R_0"], columns),
         random=tuple(
             RandomMotion(
@@ -233,6 +239,7 @@ def _read(file: Any, path: Path) -> Result:
                 checked.array(file[f"random/{index}/coefficients"], shape),
                 checked.condition(file[f"random/{index}"].attrs, "condition_number"),
                 checked.condition(file[f"random/{index}"].attrs, "stacked_condition_number"),
+                _optional(file[f"random/{index}"].attrs, "predicted_deviation", checked.number),
             )
             for index in sorted(int(name) for name in file.get("random", {}))
         ),
@@ -252,10 +259,15 @@ def _as_found(group: Any, motion: Motion, result: Result) -> Motion:
     return as_found(motion, result.digest_of(motion), samples, stored)
 
 
-def _read_stack(dataset: Any, counted: Any, columns: int) -> Stack:
+def _optional(attributes: Any, name: str, read: Callable[[Any, str], float]) -> float | None:
+    return read(attributes, name) if name in attributes else None
+
+
+def _read_stack(dataset: Any, counted: Any, columns: int, plain: Any = None) -> Stack:
     """The factor (columns, columns) and the rows it stands for, an attribute of `counted`."""
     factor = checked.array(dataset, (columns, columns))
-    return Stack(factor, checked.count(counted.attrs, "rows"))
+    below = None if plain is None else checked.array(plain, (None, None))
+    return Stack(factor, checked.count(counted.attrs, "rows"), below)
 
 
 def _read_motion(group: Any, index: int, shape: tuple[int, int]) -> Motion:
@@ -273,9 +285,6 @@ def _read_motion(group: Any, index: int, shape: tuple[int, int]) -> Motion:
         evaluations=checked.count(attributes, "evaluations"),
         margins=checked.record(attributes["margins"], dict[str, Worst]),
         certified=checked.record(attributes.get("certified", "{}"), dict[str, bool]),
-        dense_condition_number=(
-            checked.condition(attributes, "dense_condition_number")
-            if "dense_condition_number" in attributes
-            else None
-        ),
+        dense_condition_number=_optional(attributes, "dense_condition_number", checked.condition),
+        predicted_deviation=_optional(attributes, "predicted_deviation", checked.number),
     )

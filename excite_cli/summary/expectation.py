@@ -1,6 +1,5 @@
 """What planned motions are expected to tell, for people and for `--json`."""
 
-from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -37,8 +36,8 @@ def where_in_words(problem: Problem) -> str:
 
 def _power_table(power: tuple[EffectPower, ...]) -> Table:
     rows = []
-    for kind, group in groupby(power, key=lambda each: each.kind):
-        of = list(group)
+    for kind in dict.fromkeys(each.kind for each in power):
+        of = [each for each in power if each.kind == kind]
         best = min(of, key=lambda each: each.share)
         worst = max(of, key=lambda each: each.share)
         rows.append((kind, _share(best), ", ".join(best.joints), _share(worst), _joints(worst)))

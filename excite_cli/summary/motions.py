@@ -65,7 +65,7 @@ def plan_answer(
         data["efficiency_slack"] = found.slack  # the efficiency is at most too high by exp(slack)
         if found.efficiency is not None:
             parts.insert(-1, invariants_in_words(found))
-        expected = expectation(model, result, power)
+        expected = expectation(model, result, power, following.known if following else None)
         for each, deviation in zip(data["motions"], expected.deviations, strict=True):
             each["predicted_deviation"] = deviation
         data["power"] = power_data(expected.power)
@@ -137,9 +137,11 @@ _NUMBERS = ("index", "condition_number", "stacked_condition_number")
 
 def motion_table(motions: Sequence[Motion]) -> Table:
     """Condition numbers of each motion and of the stack (the paper's Table I), status, effort."""
+    planned_for_work = any(motion.predicted_deviation is not None for motion in motions)
     rows = (
         {
             "motion": str(motion.index),
+            **({"deviation": _deviation(motion)} if planned_for_work else {}),
             "own": f"{motion.condition_number:.2f}",
             "stacked": f"{motion.stacked_condition_number:.2f}",
             "stacked, finely sampled": _dense(motion),
@@ -149,7 +151,18 @@ def motion_table(motions: Sequence[Motion]) -> Table:
         }
         for motion in motions
     )
-    return Table.of("Condition numbers", rows, left=("status",))
+    title = "Condition numbers"
+    if planned_for_work:
+        title = (
+            "Standard deviation of predicted torques, in units of the noise of one sample; "
+            "condition numbers of the base regressor"
+        )
+    return Table.of(title, rows, left=("status",))
+
+
+def _deviation(motion: Motion) -> str:
+    deviation = motion.predicted_deviation
+    return "–" if deviation is None else f"{deviation:.3f}"
 
 
 def _dense(motion: Motion) -> str:
@@ -215,17 +228,19 @@ def motion_sentence(motion: Motion) -> str:
         loose = [name for name, proved in motion.certified.items() if not proved]
         told = "all constraints proved at every instant"
         note += f"; not proved: {', '.join(loose)}" if loose else f"; {told}"
-    return (
-        f"motion {motion.index}: condition number {motion.condition_number:.2f}, "
-        f"stacked {motion.stacked_condition_number:.2f} "
-        f"({motion.seconds:.1f} s, {motion.status}{note})"
+    figure = (
+        f"condition number {motion.condition_number:.2f}, "
+        f"stacked {motion.stacked_condition_number:.2f}"
     )
+    if motion.predicted_deviation is not None:
+        figure = f"predicted torques to {motion.predicted_deviation:.2f} of a sample's noise"
+    return f"motion {motion.index}: {figure} ({motion.seconds:.1f} s, {motion.status}{note})"
 
 
 def motion_data(motion: Motion) -> dict[str, Any]:
     """A motion for `--json`."""
-    own = (*_NUMBERS, "dense_condition_number", "improved", "status", "note", "seconds",
-           "iterations", "evaluations", "certified")  # fmt: skip
+    own = (*_NUMBERS, "dense_condition_number", "predicted_deviation", "improved", "status",
+           "note", "seconds", "iterations", "evaluations", "certified")  # fmt: skip
     return {
         **data_of(motion, *own),
         "doubt": motion.doubt or None,

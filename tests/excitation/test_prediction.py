@@ -95,11 +95,16 @@ def test_weights_of_rows_are_the_noise_that_somebody_knows() -> None:
     assert np.count_nonzero(np.abs(changed - 1.0) > 1e-9) == 1
 
 
-def test_condition_numbers_are_of_the_base_parameters_alone(problem: Problem) -> None:
-    alpha, objective = drawn(problem, 0.3, 1), problem.objective()
-    rank = problem.base.rank
-    own = objective.block(alpha)[:, :rank] / problem.weighting.columns
-    assert objective.own_condition_number(alpha) == pytest.approx(np.linalg.cond(own), rel=1e-6)
+def test_condition_numbers_are_those_of_the_criterion_with_that_name(problem: Problem) -> None:
+    plain = smoke("sequence.motions=1").objective()
+    stack, own = Stack.empty(plain.size), Stack.empty(problem.columns)
+    for seed in (1, 2):
+        alpha = drawn(problem, 0.3, seed)
+        plain, objective = smoke("sequence.motions=1").objective(stack), problem.objective(own)
+        for name in ("own_condition_number", "stacked_condition_number"):
+            wanted = getattr(plain, name)(alpha)
+            assert getattr(objective, name)(alpha) == pytest.approx(wanted, rel=1e-6)
+        stack, own = plain.added_to(stack, alpha), objective.added_to(own, alpha)
 
 
 def test_planned_for_the_work_it_is_predicted_better() -> None:

@@ -289,7 +289,10 @@ def test_no_other_motion_in_place_of_a_selected_one_is_better(seed: int) -> None
     def condition(some: list[int]) -> float:
         return float(np.linalg.cond(np.vstack(blocks[some])))
 
-    chosen = _select(grams, np.zeros((4, 4)), 4)
+    def figures(grams: Any) -> Any:
+        return np.linalg.cond(grams) ** 0.5
+
+    chosen = _select(figures, grams, np.zeros((4, 4)), 4)
     own = condition(chosen)
     for slot in range(4):
         for other in range(30):
