@@ -294,7 +294,9 @@ def comparison_answer(found: Comparison, output: str | None) -> Answer:
     """What `excite compare-random` answers."""
     baseline = found.baseline
     data = {
-        "random": [data_of(motion, *_NUMBERS) for motion in baseline.motions],
+        "random": [
+            data_of(motion, *_NUMBERS, "predicted_deviation") for motion in baseline.motions
+        ],
         "optimized": [motion_data(m) for m in found.result.motions],
         **data_of(baseline, "candidates", "admissible"),
         "seconds": {"optimized": found.seconds, "random": baseline.seconds},
@@ -311,7 +313,12 @@ def comparison_parts(found: Comparison) -> Parts:
 
 
 def pairs_of_numbers_table(optimized: Sequence[Motion], random: Sequence[RandomMotion]) -> Table:
-    """Condition numbers, own and stacked, motion by motion."""
+    """Condition numbers, own and stacked, motion by motion.
+
+    Of motions that are planned for torques of the work, how well these are predicted.
+    """
+    if any(motion.predicted_deviation is not None for motion in optimized):
+        return _deviations_table(optimized, random)
     rows = []
     for index, (first, second) in enumerate(zip_longest(optimized, random), start=1):
         row = {"motion": str(index)}
@@ -322,6 +329,21 @@ def pairs_of_numbers_table(optimized: Sequence[Motion], random: Sequence[RandomM
         ratio = second.stacked_condition_number / first.stacked_condition_number if both else 0.0
         rows.append({**row, "stacked ratio": f"{ratio:.2f}" if both else ""})
     return Table.of("Condition numbers, optimised and random (the paper's Tables I, II)", rows)
+
+
+def _deviations_table(optimized: Sequence[Motion], random: Sequence[RandomMotion]) -> Table:
+    rows = []
+    for index, (first, second) in enumerate(zip_longest(optimized, random), start=1):
+        one, other = (each.predicted_deviation if each else None for each in (first, second))
+        row = {"motion": str(index)}
+        for word, deviation in (("optimised", one), ("random", other)):
+            row[word] = f"{deviation:.3f}" if deviation else ""
+        rows.append({**row, "ratio": f"{other / one:.2f}" if one and other else ""})
+    title = (
+        "Standard deviation of predicted torques, in units of the noise of one sample, after each "
+        "motion and all before"
+    )
+    return Table.of(title, rows)
 
 
 def _comparison_in_words(found: Comparison) -> str:
