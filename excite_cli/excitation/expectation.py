@@ -17,7 +17,8 @@ from excite_cli.excitation.stack import Stack
 @dataclass(frozen=True)
 class Expectation:
     """`deviations`: after each motion, with all before it, the RMS standard deviation of a torque
-    of the work in units of the noise of one sample; `power`: of the effects, after all of them.
+    of the work in units of the noise of one sample; `power`: of the effects, in a diagnosis of all
+    of them that holds the last out, if there are two or more recordings.
 
     `all_data`: whether earlier data (`--prior`) are in these figures.
     """
@@ -49,10 +50,11 @@ def expectation(
     assert prediction is not None
     same = own is start and earlier.factor.shape[1] == own.columns
     stack = earlier if same else Stack.empty(own.columns)
-    objective, deviations = own.objective(), []
+    objective, deviations, stacks = own.objective(), [], [stack]
     for motion in result.motions:
-        stack = objective.added_to(stack, motion.coefficients)
-        deviations.append(prediction.deviation(stack.factor))
+        stacks.append(objective.added_to(stacks[-1], motion.coefficients))
+        deviations.append(prediction.deviation(stacks[-1].factor))
+    stack = stacks[-2] if len(stacks) > 2 or (len(stacks) == 2 and earlier.rows) else stacks[-1]
     alpha = problem.spec.diagnosis.significance
     power = tuple(
         each

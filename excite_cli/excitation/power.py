@@ -6,15 +6,19 @@ data alone know the size z of an effect (in units of its prior deviation) with
     s⁻² = 1 / (M⁻¹)_zz − 1.
 
 A diagnosis names it where it saves more χ² than its price c (`price`). With the true size z that
-χ² is noncentral, so that it is named with the power P(χ²₁(z²/s²) > c), and the size that is named
-with 95 % is about s (√c + 1.645).
+χ² is noncentral, so that it is named with the power
+
+    P(χ²₁(z²/s²) > c) = Φ(z/s − √c) + Φ(−z/s − √c),
+
+and the size that is named with 95 % is about s (√c + 1.645). What a diagnosis holds out is no part
+of the motions.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import chi2, ncx2
+from scipy.stats import chi2, norm
 
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
@@ -25,7 +29,6 @@ SURE = 0.95
 # χ² of columns that are shifted in time exceeds that of chance by this factor: the median of the
 # placebos of real logs.
 _INFLATION = 1.5
-_LARGEST = 1e3  # times the price's deviation
 
 
 @dataclass(frozen=True)
@@ -68,8 +71,7 @@ def power_of(
     for at, deviation in enumerate(_deviations(prediction, stack)):
         effect, scale, share = _about(prediction, at)
         if effect.kind == kind:
-            noncentral = (size / scale / deviation) ** 2
-            chance = float(ncx2.sf(price(type(effect), significance), 1, noncentral))
+            chance = _chance(size / scale / deviation, price(type(effect), significance))
             found.append(_record(prediction, effect, size, share * size / scale, chance))
     return tuple(found)
 
@@ -88,13 +90,20 @@ def _shown(
 ) -> EffectPower:
     effect, scale, share = _about(prediction, at)
     cost = price(type(effect), significance)
-    if np.isfinite(deviation):
-        least = np.sqrt(cost)
-        times = brentq(lambda x: ncx2.sf(cost, 1, x * x) - power, 1e-3, least + _LARGEST)
-        size = float(times * deviation)
-    else:
-        size = float("inf")
+    size = times_named(cost, power) * deviation if np.isfinite(deviation) else float("inf")
     return _record(prediction, effect, size * scale, size * share, power)
+
+
+def times_named(cost: float, power: float) -> float:
+    """Size, in standard deviations, that is named with this power at the price `cost` [χ²]."""
+    low, high = 0.0, np.sqrt(cost) - norm.ppf(min(1.0 - power, 0.5)) + 1.0
+    return float(brentq(lambda times: _chance(times, cost) - power, low, high))
+
+
+def _chance(times: float, cost: float) -> float:
+    """Φ(x − √c) + Φ(−x − √c)."""
+    least = np.sqrt(cost)
+    return float(norm.sf(least - times) + norm.sf(least + times))
 
 
 def _about(prediction: Prediction, at: int) -> tuple[Effect, float, float]:
