@@ -27,8 +27,15 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+Parts = tuple[Array | None, ...]
+"""Derivatives (K, n) of K margins by q, v, a and, of members that bound it, jerk."""
 
 _ROUNDING = 1e-12
+
+
+def part_of(order: int, rows: Array) -> Parts:
+    """Derivatives (K, n) of margins that depend on one derivative of q, that of this order."""
+    return (*(None for _ in range(order)), rows)
 
 
 class Constraint(Drawable, ABC):
@@ -54,10 +61,11 @@ class Constraint(Drawable, ABC):
         """Margins (T, m) in `unit`."""
 
     @abstractmethod
-    def gradients(
-        self, states: States, times: Indices, columns: Indices
-    ) -> tuple[Array | None, Array | None, Array | None]:
-        """Derivatives (K, n) of K margins with respect to q, v, a; None where identically zero."""
+    def gradients(self, states: States, times: Indices, columns: Indices) -> Parts:
+        """Derivatives (K, n) of K margins with respect to q, v, a (and jerk, where it is bounded).
+
+        None where identically zero.
+        """
 
     @property
     def rounding(self) -> Array:

@@ -9,7 +9,7 @@ moment point, load and friction are convex in f, for every inertia that is admit
 that keeps them as it is and standing still keeps them at any lower speed.
 """
 
-from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.base import Array, Constraint, Indices, Parts
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 
@@ -44,12 +44,9 @@ class Standing(Constraint):
         """Lower bounds (T, m) over intervals, of a robot that stands somewhere within each."""
         return self._of.least(motion.at_rest)
 
-    def gradients(
-        self, states: States, times: Indices, columns: Indices
-    ) -> tuple[Array | None, Array | None, Array | None]:
+    def gradients(self, states: States, times: Indices, columns: Indices) -> Parts:
         """Derivatives (K, n) with respect to q alone."""
-        by_q, _, _ = self._of.gradients(_at_rest(states), times, columns)
-        return by_q, None, None
+        return self._of.gradients(_at_rest(states), times, columns)[0], None, None
 
     def independent_margins(self, states: States) -> Array | None:
         """By the constraint's second way, with v and a zero."""
@@ -57,4 +54,4 @@ class Standing(Constraint):
 
 
 def _at_rest(states: States) -> States:
-    return States(states.kinematics, states.q, 0.0 * states.v, 0.0 * states.a)
+    return States.still(states.kinematics, states.q)
