@@ -14,7 +14,7 @@ import numpy as np
 
 from excite_cli.config.constraints_spec import TorqueSpec
 from excite_cli.constraints.available_torque import AvailableTorque
-from excite_cli.constraints.base import Array, Constraint, Indices, Parts
+from excite_cli.constraints.base import Array, Constraint, Indices, Parts, at_rest
 from excite_cli.constraints.joint_columns import JointColumns, Quantity
 from excite_cli.constraints.motor_limits import MotorTorque
 from excite_cli.constraints.setting import Setting
@@ -26,6 +26,7 @@ from excite_cli.dynamics.whole_robot import drawn_states
 from excite_cli.errors import ConfigError
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.enclosed_rows import least_of, torque_rows
+from excite_cli.proof.taylor import Taylor
 from excite_cli.robot.effort_curve import EffortCurve
 from excite_cli.robot.model import Robot
 
@@ -87,18 +88,6 @@ class JointTorque(Constraint):
             )
         if np.isfinite(robot.limits.effort).any():
             curves = [curve.scaled(spec.scale) for curve in robot.limits.curves]
-            by_speed = [
-                name
-                for name, curve in zip(robot.joint_names, curves, strict=True)
-                if len(curve.speeds) > 1
-            ]
-            if by_speed and setting.spec.any_speed:
-                raise ConfigError(
-                    f"robot.limits.{by_speed[0]}.effort_by_speed: with constraints.any_speed a "
-                    "motion must hold at any lower speed, which is not proved of torque that "
-                    "falls with speed. Give effort instead, the torque at the highest speed, or "
-                    "leave any_speed out."
-                )
             found.insert(0, cls(robot, curves, setting.uncertainty))
         return found
 
@@ -113,7 +102,14 @@ class JointTorque(Constraint):
 
     def margins(self, states: States) -> Array:
         """limit − |τ| on either side (T, m) [N·m or N], the least over the admitted inertias."""
-        available = self._available.at(states.v)
+        return self._margins(states, states.v)
+
+    def margins_at_rest(self, states: States) -> Array:
+        """Those of standing still, with the torque that there is at the speed of `states`."""
+        return self._margins(at_rest(states), states.v)
+
+    def _margins(self, states: States, speed: Array) -> Array:
+        available = self._available.at(speed)
         if self.uncertainty is None:
             torque = self._dynamics.torques(states.q, states.v, states.a)
             return available - self._signs * torque[:, self._joints]
@@ -124,9 +120,16 @@ class JointTorque(Constraint):
 
     def least(self, motion: EnclosedMotion) -> Array:
         """Lower bounds on what is left on either side (T, m), for every admitted inertia."""
+        return self._least(motion, motion.states.v)
+
+    def least_at_rest(self, motion: EnclosedMotion) -> Array:
+        """The same of `margins_at_rest`."""
+        return self._least(motion.at_rest, motion.states.v)
+
+    def _least(self, motion: EnclosedMotion, speed: Taylor) -> Array:
         half = len(self._joints) // 2
         rows = torque_rows(motion)[:, self._joints[:half]]
-        available = self._available.least(motion.states.v)
+        available = self._available.least(speed)
         below = least_of(rows, self._admitted, available[:, :half])
         above = least_of(-rows, self._admitted, available[:, half:])
         return np.hstack([below, above])
@@ -136,6 +139,13 @@ class JointTorque(Constraint):
         by_q, by_v, by_a = self._torque_gradients(states, times, columns)
         self._available.add_slopes(by_v, states.v[times], columns)
         return by_q, by_v, by_a
+
+    def gradients_at_rest(self, states: States, times: Indices, columns: Indices) -> Parts:
+        """By position, of the torque, and by speed, of the limit."""
+        by_q, by_v, _ = self._torque_gradients(at_rest(states), times, columns)
+        by_v = 0.0 * by_v
+        self._available.add_slopes(by_v, states.v[times], columns)
+        return by_q, by_v
 
     def _torque_gradients(
         self, states: States, times: Indices, columns: Indices

@@ -7,7 +7,8 @@ With |x_j(t)| ≤ share·x_max,j required of speeds, accelerations and jerks at 
 The largest derivatives are bounds over whole intervals of time (Taylor models), so that the limits
 hold between samples too. Torques of rigid bodies, τ = τ_g + c²·(τ₁ − τ_g),
 lie between those of standing still at the same posture, τ_g, and those of the original, τ₁: a slow
-motion can break a bound on torque only where standing still breaks it.
+motion can break a bound on torque only where standing still breaks it (or, of a motor that has less
+torque at speed, would break it with that of the motion's speed).
 """
 
 from collections.abc import Sequence

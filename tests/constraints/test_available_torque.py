@@ -11,7 +11,6 @@ from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty, inertia_uncertainty
-from excite_cli.errors import ConfigError
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.enclosed_trajectory import enclosed_states, intervals_of
 from excite_cli.robot.model import Robot
@@ -80,7 +79,19 @@ def test_bounds_between_instants_hold_at_instants(uncertain: bool, width: float)
         assert (np.min(near, axis=0) - least).max() < 0.05 * torque.scale.max()
 
 
-def test_any_speed_is_refused() -> None:
+@pytest.mark.parametrize("uncertain", [False, True])
+def test_what_holds_at_rest_with_the_torque_of_speed_holds_at_any_lower_speed(
+    uncertain: bool,
+) -> None:
+    hand = robot()
     spec = TORQUE.model_copy(update={"any_speed": True})
-    with pytest.raises(ConfigError, match=r"robot.limits.wrist.effort_by_speed: with .*any_speed"):
-        build_constraints(spec, robot())
+    moving, standing = build_constraints(spec, hand, known(hand, uncertain))
+    assert standing.name == "joint_torque_standing"
+    check_gradients(hand, standing, 1, 1e-5)
+    q, v, a = hand.draw_states(300, 3)
+    kinematics = BatchKinematics(hand)
+    full = States(kinematics, q, v, a)
+    least = np.minimum(moving.margins(full), standing.margins(full))
+    for s in (0.1, 0.5, 0.9):
+        slower = moving.margins(States(kinematics, q, s * v, s * s * a))
+        assert (slower - least).min() > -1e-9
