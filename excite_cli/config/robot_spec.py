@@ -1,13 +1,15 @@
 """What a YAML file may say about the robot."""
 
 from collections import Counter
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
 from excite_cli.config.limit_presets import LIMIT_PRESETS
 from excite_cli.config.section import Finite, NonNegative, Positive, Section, Vector3
 from excite_cli.errors import nearest
+
+PresetName = Annotated[str, Field(json_schema_extra={"enum": [*LIMIT_PRESETS]})]
 
 
 class JointLimits(Section):
@@ -142,11 +144,9 @@ class RobotSpec(Section):
     )
     gravity: Vector3 = Field((0.0, 0.0, -9.81), description="[m/s²] in the world frame")
     limits: dict[str, JointLimits] = Field(default_factory=dict)
-    limits_preset: str | None = Field(
+    limits_preset: PresetName | None = Field(
         None,
-        description="limits of a robot's manual in place of the URDF's, for joints that `limits` "
-        f"does not give: {', '.join(LIMIT_PRESETS)}",
-        json_schema_extra={"enum": [*LIMIT_PRESETS, None]},
+        description="limits of a robot's manual in place of the URDF's, where `limits` gives none",
     )
     transmissions: tuple[TransmissionSpec, ...] = Field(
         (), description="motors that drive several joints together"
