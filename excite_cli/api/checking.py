@@ -46,7 +46,7 @@ def check(
 
     `motions` are a result, what `motions_of` gives, or any file of motions. Margins are taken at
     `rate` [Hz] and at `random` further instants; verdicts hold between them. With `slow` the
-    motions are judged slowed to that share of the limits of speed and acceleration.
+    motions are judged slowed to that share of the limits of speed, acceleration and jerk.
     `progress(done, total)` is called before every motion.
 
     Returns

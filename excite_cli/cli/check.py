@@ -21,7 +21,7 @@ def check(
         typer.Option(
             "--slow",
             metavar="SHARE",
-            help="Judge the motions slowed to a share of the limits of speed and acceleration.",
+            help="Judge the motions slowed to a share of their limits of speed to jerk.",
         ),
     ] = None,
     overrides: options.Set = None,

@@ -53,7 +53,7 @@ def export(
         typer.Option(
             "--slow",
             metavar="SHARE",
-            help="Slow down until speeds and accelerations keep this share of their limits.",
+            help="Slow down until speeds, accelerations and jerks keep this share of their limits.",
         ),
     ] = None,
     entry: Annotated[

@@ -16,13 +16,14 @@ from excite_cli.config.section import (
 
 
 class JointLimitsSpec(Section):
-    """Bounds on joint position, velocity and acceleration."""
+    """Bounds on joint position, velocity, acceleration and jerk."""
 
     position: StrictBool = Field(True, description="keep the URDF's position limits")
     velocity: StrictBool | Positive = Field(
         True, description="URDF limit, or [rad/s] for every joint"
     )
     acceleration: Positive | None = Field(None, description="[rad/s²] for every joint")
+    jerk: Positive | None = Field(None, description="[rad/s³] for every joint")
     scale: Share = Field(1.0, description="share of velocity limits")
     position_margin: NonNegative = Field(0.0, description="kept from position limits [rad or m]")
 

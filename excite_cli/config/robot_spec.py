@@ -1,11 +1,15 @@
 """What a YAML file may say about the robot."""
 
 from collections import Counter
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from excite_cli.config.limit_presets import LIMIT_PRESETS
 from excite_cli.config.section import Finite, NonNegative, Positive, Section, Vector3
+from excite_cli.errors import nearest
+
+PresetName = Annotated[str, Field(json_schema_extra={"enum": [*LIMIT_PRESETS]})]
 
 
 class JointLimits(Section):
@@ -14,7 +18,14 @@ class JointLimits(Section):
     position: tuple[Finite, Finite] | None = Field(None, description="lower, upper [rad or m]")
     velocity: Positive | None = Field(None, description="largest speed [rad/s or m/s]")
     acceleration: Positive | None = Field(None, description="largest acceleration [rad/s²]")
+    jerk: Positive | None = Field(None, description="largest jerk [rad/s³]")
     effort: Positive | None = Field(None, description="largest torque [N·m or N]")
+    effort_by_speed: tuple[tuple[NonNegative, NonNegative], ...] | None = Field(
+        None,
+        description="in place of effort, [speed, torque] points [rad/s, N·m] of the motor's curve, "
+        "from speed 0 on, straight lines between them; holds where the motor drives, braking has "
+        "the torque of speed 0; beyond the last point the last line goes on",
+    )
 
     @field_validator("position")
     @classmethod
@@ -22,6 +33,31 @@ class JointLimits(Section):
         if value is not None and value[0] >= value[1]:
             raise ValueError(f"the lower limit {value[0]:g} is not below the upper {value[1]:g}")
         return value
+
+    @field_validator("effort_by_speed")
+    @classmethod
+    def _a_curve(cls, value: Any) -> Any:
+        if value is None:
+            return value
+        speeds, efforts = zip(*value, strict=True) if value else ((), ())
+        if len(value) < 2:
+            raise ValueError("give at least two points; for one torque at all speeds give effort")
+        if speeds[0] != 0.0 or efforts[0] == 0.0:
+            raise ValueError("the first point must have speed 0 and a torque above 0")
+        for k in range(1, len(value)):
+            before, here = value[k - 1], value[k]
+            if here[0] <= before[0] or here[1] > before[1]:
+                raise ValueError(
+                    f"[{here[0]:g}, {here[1]:g}] after [{before[0]:g}, {before[1]:g}]: speeds must "
+                    "increase and torques must not"
+                )
+        return value
+
+    @model_validator(mode="after")
+    def _one_effort(self) -> "JointLimits":
+        if self.effort is not None and self.effort_by_speed is not None:
+            raise ValueError("give effort or effort_by_speed, not both")
+        return self
 
 
 class TransmissionSpec(Section):
@@ -45,10 +81,15 @@ class TransmissionSpec(Section):
             )
         if len(self.matrix) != count or any(len(row) != count for row in self.matrix):
             raise ValueError(f"matrix must have {count} rows of {count} numbers, a row per joint")
-        for name in self.limits:
+        for name, own in self.limits.items():
             if name not in self.motors:
                 raise ValueError(
                     f"limits: '{name}' is none of its motors ({', '.join(self.motors)})"
+                )
+            if own.effort_by_speed is not None:
+                raise ValueError(
+                    f"limits.{name}.effort_by_speed: only for a motor that drives one joint alone; "
+                    "give effort, the torque at the highest speed that the motor is to have"
                 )
         return self
 
@@ -103,6 +144,10 @@ class RobotSpec(Section):
     )
     gravity: Vector3 = Field((0.0, 0.0, -9.81), description="[m/s²] in the world frame")
     limits: dict[str, JointLimits] = Field(default_factory=dict)
+    limits_preset: PresetName | None = Field(
+        None,
+        description="limits of a robot's manual in place of the URDF's, where `limits` gives none",
+    )
     transmissions: tuple[TransmissionSpec, ...] = Field(
         (), description="motors that drive several joints together"
     )
@@ -117,6 +162,16 @@ class RobotSpec(Section):
             twice = sorted(j for j, count in Counter(value).items() if count > 1)
             if twice:
                 raise ValueError(f"named twice: {', '.join(twice)}")
+        return value
+
+    @field_validator("limits_preset")
+    @classmethod
+    def _known_preset(cls, value: str | None) -> str | None:
+        if value is not None and value not in LIMIT_PRESETS:
+            known = ", ".join(LIMIT_PRESETS)
+            raise ValueError(
+                f"there is no '{value}'.{nearest(value, LIMIT_PRESETS)} There are {known}"
+            )
         return value
 
     @model_validator(mode="after")

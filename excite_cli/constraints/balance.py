@@ -13,7 +13,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from excite_cli.config.constraints_spec import DiscSpec, PolygonSpec
-from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.base import Array, Constraint, Indices, Parts
 from excite_cli.constraints.drawing import ConstraintScene, GroundRegion
 from excite_cli.constraints.setting import Setting
 from excite_cli.constraints.support_polygon import Support, support_polygon
@@ -128,9 +128,7 @@ class Balance(Constraint):
         edges = combined(self._functionals, rows)
         return least_of(edges, self._known) / self._mass.total_mass
 
-    def gradients(
-        self, states: States, times: Indices, columns: Indices
-    ) -> tuple[Array | None, Array | None, Array | None]:
+    def gradients(self, states: States, times: Indices, columns: Indices) -> Parts:
         """−normalᵀ ∂c/∂q, with the worst inertias of each edge and instant."""
         if self.uncertainty is None:
             towards = -self.normals @ self._mass.jacobian(states)[:, :2]

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,8 +28,20 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+Parts = tuple[Array | None, ...]
+"""Derivatives (K, n) of K margins by q, v, a and, of members that bound it, jerk."""
 
 _ROUNDING = 1e-12
+
+
+def part_of(order: int, rows: Array) -> Parts:
+    """Derivatives (K, n) of margins that depend on one derivative of q, that of this order."""
+    return (*(None for _ in range(order)), rows)
+
+
+def at_rest(states: States) -> States:
+    """Standing still at the same positions."""
+    return replace(states, v=0.0 * states.v, a=0.0 * states.a)
 
 
 class Constraint(Drawable, ABC):
@@ -54,10 +67,11 @@ class Constraint(Drawable, ABC):
         """Margins (T, m) in `unit`."""
 
     @abstractmethod
-    def gradients(
-        self, states: States, times: Indices, columns: Indices
-    ) -> tuple[Array | None, Array | None, Array | None]:
-        """Derivatives (K, n) of K margins with respect to q, v, a; None where identically zero."""
+    def gradients(self, states: States, times: Indices, columns: Indices) -> Parts:
+        """Derivatives (K, n) of K margins with respect to q, v, a (and jerk, where it is bounded).
+
+        None where identically zero.
+        """
 
     @property
     def rounding(self) -> Array:
@@ -78,6 +92,18 @@ class Constraint(Drawable, ABC):
         None where no such bound is known.
         """
         return None
+
+    def margins_at_rest(self, states: States) -> Array:
+        """Margins (T, m) of forces of a robot that stands still where `states` are."""
+        return self.margins(at_rest(states))
+
+    def gradients_at_rest(self, states: States, times: Indices, columns: Indices) -> Parts:
+        """Derivatives (K, n) of those margins."""
+        return self.gradients(at_rest(states), times, columns)[:1]
+
+    def least_at_rest(self, motion: EnclosedMotion) -> Array | None:
+        """Lower bounds (T, m) on those margins over intervals."""
+        return self.least(motion.at_rest)
 
     @property
     def of_joints(self) -> JointColumns | None:

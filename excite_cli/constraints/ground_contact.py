@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.config.constraints_spec import ContactSpec
-from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.base import Array, Constraint, Indices, Parts
 from excite_cli.constraints.drawing import ConstraintScene, GroundRegion
 from excite_cli.constraints.setting import Setting
 from excite_cli.constraints.support_polygon import Support, support_polygon
@@ -119,9 +119,7 @@ class ZeroMomentPoint(Constraint):
         wrench = ground_rows(motion, np.zeros(3))
         return least_of(combined(self.functionals, wrench), self.uncertainty) / self.ground.weight
 
-    def gradients(
-        self, states: States, times: Indices, columns: Indices
-    ) -> tuple[Array | None, Array | None, Array | None]:
+    def gradients(self, states: States, times: Indices, columns: Indices) -> Parts:
         """Those of (a − λ f_z)·W / f_z with the worst inertias of each edge and instant."""
         rows, at = self.ground.wrench.regressor(states), (times, columns)
         found = self._worst(states)
@@ -216,9 +214,7 @@ class GroundContact(Constraint):
         wrench = ground_rows(motion, np.zeros(3))
         return least_of(combined(self.functionals, wrench), self.uncertainty) - self.least_values
 
-    def gradients(
-        self, states: States, times: Indices, columns: Indices
-    ) -> tuple[Array | None, Array | None, Array | None]:
+    def gradients(self, states: States, times: Indices, columns: Indices) -> Parts:
         """Those of functionals·W with the worst inertias of each."""
         instants, inverse = np.unique(times, return_inverse=True)
         rows = self.ground.wrench.regressor(states)[instants]

@@ -1,4 +1,4 @@
-"""Bounds on joint positions, velocities or accelerations (Eq. 51): linear, one joint a row."""
+"""Bounds on joint positions and their first three derivatives (Eq. 51): linear, one joint a row."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.config.constraints_spec import JointLimitsSpec
-from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.base import Array, Constraint, Indices, Parts, part_of
 from excite_cli.constraints.joint_columns import JointColumns, Quantity
-from excite_cli.constraints.motor_limits import MotorBound
+from excite_cli.constraints.motor_limits import ORDERS, UNITS, MotorBound
 from excite_cli.constraints.setting import Setting
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.errors import ConfigError
@@ -19,16 +19,14 @@ from excite_cli.robot.model import Robot
 
 Mask = NDArray[np.bool_]
 
-_ORDERS = ("position", "velocity", "acceleration")
 _TITLES = ("Joint position to its limit", "Joint speed to its limit",
-           "Joint acceleration to its limit")  # fmt: skip
-_UNITS = ("rad", "rad/s", "rad/s²")
-_SLIDING_UNITS = ("m", "m/s", "m/s²")
+           "Joint acceleration to its limit", "Joint jerk to its limit")  # fmt: skip
+_SLIDING_UNITS = ("m", "m/s", "m/s²", "m/s³")
 
 
 @dataclass(frozen=True)
 class JointBound(Constraint):
-    """lower ≤ x_j ≤ upper for the derivative of the given order (0, 1, 2) of q.
+    """lower ≤ x_j ≤ upper for the derivative of the given order (0 to 3) of q.
 
     `joints`, `signs`, `bounds` (m,): margin = bound − sign·x_joint. `scale` is half the range.
     """
@@ -43,8 +41,8 @@ class JointBound(Constraint):
 
     @property
     def name(self) -> str:  # type: ignore[override]
-        """`joint_position`, `joint_velocity` or `joint_acceleration`."""
-        return f"joint_{_ORDERS[self.order]}"
+        """`joint_position`, `joint_velocity`, `joint_acceleration` or `joint_jerk`."""
+        return f"joint_{ORDERS[self.order]}"
 
     @property
     def title(self) -> str:
@@ -59,11 +57,11 @@ class JointBound(Constraint):
     @property
     def unit(self) -> str:  # type: ignore[override]
         """Unit of revolute joints; see `unit_of`."""
-        return _UNITS[self.order]
+        return UNITS[self.order]
 
     def unit_of(self, column: int) -> str:
         """Metres instead of radians for a prismatic joint."""
-        units = _SLIDING_UNITS if self.sliding[self.joints[column]] else _UNITS
+        units = _SLIDING_UNITS if self.sliding[self.joints[column]] else UNITS
         return units[self.order]
 
     @classmethod
@@ -86,7 +84,7 @@ class JointBound(Constraint):
 
     @classmethod
     def build(cls, spec: JointLimitsSpec, setting: Setting) -> Iterable[Constraint]:
-        """Of positions, speeds and accelerations, of joints and of motors that drive several."""
+        """Of joint positions to jerks, and of those of motors that drive several joints."""
         robot = setting.robot
         found: list[Constraint] = []
         limits, names = robot.limits, robot.joint_names
@@ -105,16 +103,18 @@ class JointBound(Constraint):
             speed = limits.velocity if given is None else np.minimum(limits.velocity, given)
             speed = spec.scale * speed
             found.append(cls.between(1, -speed, speed, robot))
-        acceleration = limits.acceleration
-        if spec.acceleration is not None:
-            acceleration = np.minimum(acceleration, spec.acceleration)
-        found.append(cls.between(2, -acceleration, acceleration, robot))
+        for order, own, given in (
+            (2, limits.acceleration, spec.acceleration),
+            (3, limits.jerk, spec.jerk),
+        ):
+            bound = own if given is None else np.minimum(own, given)
+            found.append(cls.between(order, -bound, bound, robot))
         of_motors = () if robot.motors is None else _motor_bounds(spec, robot.motors)
         return [bound for bound in (*found, *of_motors) if bound.labels]
 
     def values(self, states: States) -> Array:
         """The bounded quantity (T, n)."""
-        return (states.q, states.v, states.a)[self.order]
+        return states.order(self.order)
 
     def margins(self, states: States) -> Array:
         """Distance to each bound (T, m)."""
@@ -122,19 +122,14 @@ class JointBound(Constraint):
 
     def least(self, motion: EnclosedMotion) -> Array:
         """bound − the most that sign·x_joint can be (T, m)."""
-        states = motion.states
-        x = (states.q, states.v, states.a)[self.order]
+        x = motion.states.order(self.order)
         return self.bounds - x[:, self.joints].scaled(self.signs).upper()
 
-    def gradients(
-        self, states: States, times: Indices, columns: Indices
-    ) -> tuple[Array | None, Array | None, Array | None]:
+    def gradients(self, states: States, times: Indices, columns: Indices) -> Parts:
         """−sign at the joint, zero elsewhere."""
         rows = np.zeros((len(times), states.q.shape[1]))
         rows[np.arange(len(times)), self.joints[columns]] = -self.signs[columns]
-        parts: list[Array | None] = [None, None, None]
-        parts[self.order] = rows
-        return parts[0], parts[1], parts[2]
+        return part_of(self.order, rows)
 
 
 def _motor_bounds(spec: JointLimitsSpec, motors: Motors) -> Iterable[Constraint]:
@@ -144,5 +139,6 @@ def _motor_bounds(spec: JointLimitsSpec, motors: Motors) -> Iterable[Constraint]
     if spec.velocity is not False:
         speed = spec.scale * motors.bounds("velocity")
         yield MotorBound(motors, 1, -speed, speed)
-    acceleration = motors.bounds("acceleration")
-    yield MotorBound(motors, 2, -acceleration, acceleration)
+    for order in (2, 3):
+        bound = motors.bounds(ORDERS[order])
+        yield MotorBound(motors, order, -bound, bound)

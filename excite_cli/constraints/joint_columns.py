@@ -13,7 +13,8 @@ class Quantity(IntEnum):
     POSITION = 0
     VELOCITY = 1
     ACCELERATION = 2
-    TORQUE = 3
+    JERK = 3
+    TORQUE = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +29,7 @@ class JointColumns:
     @property
     def linear(self) -> bool:
         """Whether margins are linear in the coefficients of a motion."""
-        return self.quantity <= Quantity.ACCELERATION
+        return self.quantity <= Quantity.JERK
 
     def put_into(self, lower: NDArray[np.float64], upper: NDArray[np.float64]) -> None:
         """Write the bounds to their joints (n,) in `lower` and `upper`."""

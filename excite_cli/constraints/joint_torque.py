@@ -3,15 +3,18 @@
 With uncertain inertias the torque Y_j φ of a joint must stay within its limit for every admitted φ:
 limit + min_φ (∓ Y_j φ) ≥ 0. The derivative of that margin is a derivative of the torque with the
 worst inertias, which differ between instants, joints and sides.
+
+Where a motor's curve is given, the limit is that at the speed of the joint (`available_torque`).
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from excite_cli.config.constraints_spec import TorqueSpec
-from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.available_torque import AvailableTorque
+from excite_cli.constraints.base import Array, Constraint, Indices, Parts, at_rest
 from excite_cli.constraints.joint_columns import JointColumns, Quantity
 from excite_cli.constraints.motor_limits import MotorTorque
 from excite_cli.constraints.setting import Setting
@@ -23,11 +26,15 @@ from excite_cli.dynamics.whole_robot import drawn_states
 from excite_cli.errors import ConfigError
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.enclosed_rows import least_of, torque_rows
+from excite_cli.proof.taylor import Taylor
+from excite_cli.robot.effort_curve import EffortCurve
 from excite_cli.robot.model import Robot
 
 
 class JointTorque(Constraint):
-    """|τ_j| ≤ limit_j; columns: lower then upper side of every bounded joint.
+    """±τ_j ≤ c_j(±v_j); columns: lower then upper side of every bounded joint.
+
+    `curves` (n,): torque by speed; infinite: not bounded.
 
     `uncertainty`: admitted inertias of the whole robot; None: those of the URDF.
     """
@@ -38,14 +45,19 @@ class JointTorque(Constraint):
     unit = "N·m"
 
     def __init__(
-        self, robot: Robot, limits: Array, uncertainty: InertiaUncertainty | None = None
+        self,
+        robot: Robot,
+        curves: Sequence[EffortCurve],
+        uncertainty: InertiaUncertainty | None = None,
     ) -> None:
         self._dynamics = InverseDynamics(robot)
-        bounded = np.flatnonzero(np.isfinite(limits))
+        bounded = np.flatnonzero([np.isfinite(curve.efforts[0]) for curve in curves])
         self._joints = np.concatenate([bounded, bounded])
         self._signs = np.concatenate([-np.ones(len(bounded)), np.ones(len(bounded))])
-        self._limits = limits[self._joints]
-        self.scale = self._limits
+        self._available = AvailableTorque(
+            self._joints, self._signs, [curves[j] for j in self._joints]
+        )
+        self.scale = self._available.still
         self._sliding = robot.sliding
         self.labels = tuple(
             f"{robot.joint_names[j]} {side}" for side in ("lower", "upper") for j in bounded
@@ -75,13 +87,14 @@ class JointTorque(Constraint):
                 "robot.limits.<joint>.effort."
             )
         if np.isfinite(robot.limits.effort).any():
-            found.insert(0, cls(robot, spec.scale * robot.limits.effort, setting.uncertainty))
+            curves = [curve.scaled(spec.scale) for curve in robot.limits.curves]
+            found.insert(0, cls(robot, curves, setting.uncertainty))
         return found
 
     @property
     def of_joints(self) -> JointColumns:
-        """Both sides of every bounded joint."""
-        return JointColumns(Quantity.TORQUE, self._joints, self._signs, self._limits)
+        """Both sides of every bounded joint, with the torque at no speed."""
+        return JointColumns(Quantity.TORQUE, self._joints, self._signs, self._available.still)
 
     def unit_of(self, column: int) -> str:
         """Newtons for a prismatic joint."""
@@ -89,25 +102,54 @@ class JointTorque(Constraint):
 
     def margins(self, states: States) -> Array:
         """limit − |τ| on either side (T, m) [N·m or N], the least over the admitted inertias."""
+        return self._margins(states, states.v)
+
+    def margins_at_rest(self, states: States) -> Array:
+        """Those of standing still, with the torque that there is at the speed of `states`."""
+        return self._margins(at_rest(states), states.v)
+
+    def _margins(self, states: States, speed: Array) -> Array:
+        available = self._available.at(speed)
         if self.uncertainty is None:
             torque = self._dynamics.torques(states.q, states.v, states.a)
-            return self._limits - self._signs * torque[:, self._joints]
+            return available - self._signs * torque[:, self._joints]
         half = len(self._joints) // 2
         rows = self._regressor.evaluate(states.q, states.v, states.a)[:, self._joints[:half]]
         lower, upper = self._admitted.least_both(rows)
-        return self._limits + np.hstack([lower, upper])
+        return available + np.hstack([lower, upper])
 
     def least(self, motion: EnclosedMotion) -> Array:
         """Lower bounds on what is left on either side (T, m), for every admitted inertia."""
+        return self._least(motion, motion.states.v)
+
+    def least_at_rest(self, motion: EnclosedMotion) -> Array:
+        """The same of `margins_at_rest`."""
+        return self._least(motion.at_rest, motion.states.v)
+
+    def _least(self, motion: EnclosedMotion, speed: Taylor) -> Array:
         half = len(self._joints) // 2
         rows = torque_rows(motion)[:, self._joints[:half]]
-        below, above = least_of(rows, self._admitted), least_of(-rows, self._admitted)
-        return self._limits + np.hstack([below, above])
+        available = self._available.least(speed)
+        below = least_of(rows, self._admitted, available[:, :half])
+        above = least_of(-rows, self._admitted, available[:, half:])
+        return np.hstack([below, above])
 
-    def gradients(
+    def gradients(self, states: States, times: Indices, columns: Indices) -> Parts:
+        """Slope of the limit less rows of the inverse-dynamics derivatives, of worst inertias."""
+        by_q, by_v, by_a = self._torque_gradients(states, times, columns)
+        self._available.add_slopes(by_v, states.v[times], columns)
+        return by_q, by_v, by_a
+
+    def gradients_at_rest(self, states: States, times: Indices, columns: Indices) -> Parts:
+        """By position, of the torque, and by speed, of the limit."""
+        by_q, by_v, _ = self._torque_gradients(at_rest(states), times, columns)
+        by_v = 0.0 * by_v
+        self._available.add_slopes(by_v, states.v[times], columns)
+        return by_q, by_v
+
+    def _torque_gradients(
         self, states: States, times: Indices, columns: Indices
-    ) -> tuple[Array | None, Array | None, Array | None]:
-        """Rows of the inverse-dynamics derivatives, with the worst inertias of each."""
+    ) -> tuple[Array, Array, Array]:
         joints, sign = self._joints[columns], -self._signs[columns][:, None]
         if self.uncertainty is not None:
             return self._robust_gradients(states, times, joints, sign)

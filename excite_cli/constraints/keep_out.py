@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.config.constraints_spec import KeepOutSpec
-from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.base import Array, Constraint, Indices, Parts
 from excite_cli.constraints.setting import Setting
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.errors import ConfigError, nearest
@@ -70,9 +70,7 @@ class KeepOut(Constraint):
             found.append(sides.max(axis=1))
         return np.column_stack(found)
 
-    def gradients(
-        self, states: States, times: Indices, columns: Indices
-    ) -> tuple[Array | None, Array | None, Array | None]:
+    def gradients(self, states: States, times: Indices, columns: Indices) -> Parts:
         """−1 or 1 at the joint that is farthest outside."""
         rows = np.zeros((len(times), states.q.shape[1]))
         for column, region in enumerate(self.regions):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.base import Array, Constraint, Indices, Parts
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.geometry.pair_table import PairTable
 from excite_cli.geometry.pair_tables import FAR
@@ -64,9 +64,7 @@ class MeshClearance(Constraint):
             found.append(np.where(inside, least, -np.inf))
         return np.stack(found, axis=1) - self._kept
 
-    def gradients(
-        self, states: States, times: Indices, columns: Indices
-    ) -> tuple[Array | None, Array | None, Array | None]:
+    def gradients(self, states: States, times: Indices, columns: Indices) -> Parts:
         """Slopes of the tables by the two joints of each."""
         rows = np.zeros((len(times), states.q.shape[1]))
         for column, table in enumerate(self.tables):

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.base import Array, Constraint, Indices, Parts, part_of
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.dynamics.regressor import InverseDynamics, Regressor
 from excite_cli.dynamics.row_adjoint import RowAdjoint
@@ -18,8 +18,8 @@ from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.enclosed_rows import combined, least_of, torque_rows
 from excite_cli.robot.model import Robot
 
-_ORDERS = ("position", "velocity", "acceleration")
-_UNITS = ("rad", "rad/s", "rad/s²")
+ORDERS = ("position", "velocity", "acceleration", "jerk")
+UNITS = ("rad", "rad/s", "rad/s²", "rad/s³")
 
 
 class _Sides:
@@ -39,14 +39,14 @@ class _Sides:
 
 
 class MotorBound(Constraint):
-    """lower ≤ x ≤ upper for the derivative of the given order (0, 1, 2) of the motors' positions.
+    """lower ≤ x ≤ upper for the derivative of the given order (0 to 3) of the motors' positions.
 
     `lower`, `upper` (n,), infinite where there is none.
     """
 
     def __init__(self, motors: Motors, order: int, lower: Array, upper: Array) -> None:
         self._sides, self._order = _Sides(motors, lower, upper), order
-        self.name, self.unit = f"motor_{_ORDERS[order]}", _UNITS[order]
+        self.name, self.unit = f"motor_{ORDERS[order]}", UNITS[order]
         self.labels, self.scale = self._sides.labels, self._sides.scale
         back = np.linalg.inv(motors.matrix)[self._sides.motors]
         self._slopes = self._sides.signs[:, None] * back  # (m, n): signed motor by joint
@@ -54,26 +54,20 @@ class MotorBound(Constraint):
     @property
     def title(self) -> str:
         """Says which quantity."""
-        return f"Motor {_ORDERS[self._order]} to its limit"
+        return f"Motor {ORDERS[self._order]} to its limit"
 
     def margins(self, states: States) -> Array:
         """Distance to each bound (T, m)."""
-        x = (states.q, states.v, states.a)[self._order]
-        return np.asarray(self._sides.bounds - x @ self._slopes.T)
+        return np.asarray(self._sides.bounds - states.order(self._order) @ self._slopes.T)
 
     def least(self, motion: EnclosedMotion) -> Array:
         """bound − the most that the signed quantity can be (T, m)."""
-        states = motion.states
-        x = (states.q, states.v, states.a)[self._order]
+        x = motion.states.order(self._order)
         return np.asarray(self._sides.bounds - x.through(self._slopes).upper())
 
-    def gradients(
-        self, states: States, times: Indices, columns: Indices
-    ) -> tuple[Array | None, Array | None, Array | None]:
+    def gradients(self, states: States, times: Indices, columns: Indices) -> Parts:
         """The same at all instants."""
-        parts: list[Array | None] = [None, None, None]
-        parts[self._order] = -self._slopes[columns]
-        return parts[0], parts[1], parts[2]
+        return part_of(self._order, -self._slopes[columns])
 
 
 class MotorTorque(Constraint):
@@ -116,9 +110,7 @@ class MotorTorque(Constraint):
         rows = combined(-self._signed, torque_rows(motion))
         return np.asarray(self._sides.bounds + least_of(rows, self._admitted))
 
-    def gradients(
-        self, states: States, times: Indices, columns: Indices
-    ) -> tuple[Array | None, Array | None, Array | None]:
+    def gradients(self, states: States, times: Indices, columns: Indices) -> Parts:
         """Sums of rows of the inverse-dynamics derivatives, with the worst inertias of each."""
         q, v, a = states.q, states.v, states.a
         instants, inverse = np.unique(times, return_inverse=True)

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from excite_cli.config.constraints_spec import SurroundingsSpec
-from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.base import Array, Constraint, Indices, Parts
 from excite_cli.constraints.drawing import ConstraintScene, NearestBodies
 from excite_cli.constraints.nearest_bodies import nearest_obstacles
 from excite_cli.constraints.setting import Setting
@@ -136,9 +136,7 @@ class Surroundings(Constraint):
             least[:, columns] = least_clearances(axes, obstacle, capsule[columns], enough)
         return least - self.pairs.kept
 
-    def gradients(
-        self, states: States, times: Indices, columns: Indices
-    ) -> tuple[Array | None, Array | None, Array | None]:
+    def gradients(self, states: States, times: Indices, columns: Indices) -> Parts:
         """Normal of the obstacle times the Jacobian of the witness point on the capsule's axis."""
         return self._distances.gradients(states, times, columns), None, None
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from excite_cli.config.constraints_spec import SelfCollisionSpec
-from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.base import Array, Constraint, Indices, Parts
 from excite_cli.constraints.drawing import ConstraintScene, NearestBodies
 from excite_cli.constraints.mesh_clearance import KEPT, MeshClearance
 from excite_cli.constraints.nearest_bodies import nearest_capsules
@@ -143,8 +143,6 @@ class SelfCollision(Constraint):
         first, second = np.array(self.pairs.checked, dtype=np.intp).T
         return axes.least_distances(first, second, self.margin) - self.margin
 
-    def gradients(
-        self, states: States, times: Indices, columns: Indices
-    ) -> tuple[Array | None, Array | None, Array | None]:
+    def gradients(self, states: States, times: Indices, columns: Indices) -> Parts:
         """Witness normal times the difference of the witness points' Jacobians."""
         return self._clearance.gradients(states, times, columns), None, None

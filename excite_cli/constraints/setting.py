@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
 from excite_cli.config.constraints_spec import ConstraintsSpec, SelfCollisionSpec
 from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
@@ -41,6 +39,5 @@ class Setting:
     def posture_center_of_mass(self) -> Array:
         """World x, y of the centre of mass at the posture (2,)."""
         robot = self.robot
-        still = np.zeros((1, robot.n))
-        states = States(BatchKinematics(robot), robot.posture[None], still, still)
+        states = States.still(BatchKinematics(robot), robot.posture[None])
         return CenterOfMass(robot).position(states)[0, :2]

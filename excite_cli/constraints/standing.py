@@ -6,10 +6,12 @@ Played s ≤ 1 times as fast, a motion needs the torques, or the wrench on the g
 
 because what does not hold up the weight grows with the square of the speed. Limits of torque, zero
 moment point, load and friction are convex in f, for every inertia that is admitted. So a motion
-that keeps them as it is and standing still keeps them at any lower speed.
+that keeps them as it is and standing still keeps them at any lower speed. Where a motor has less
+torque at speed, standing still must do with that of the motion's speed: c(s v) ≥ c(v) then is
+enough in between.
 """
 
-from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.base import Array, Constraint, Indices, Parts, at_rest
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 
@@ -38,23 +40,16 @@ class Standing(Constraint):
 
     def margins(self, states: States) -> Array:
         """Margins (T, m) of the constraint with v and a zero."""
-        return self._of.margins(_at_rest(states))
+        return self._of.margins_at_rest(states)
 
     def least(self, motion: EnclosedMotion) -> Array | None:
         """Lower bounds (T, m) over intervals, of a robot that stands somewhere within each."""
-        return self._of.least(motion.at_rest)
+        return self._of.least_at_rest(motion)
 
-    def gradients(
-        self, states: States, times: Indices, columns: Indices
-    ) -> tuple[Array | None, Array | None, Array | None]:
-        """Derivatives (K, n) with respect to q alone."""
-        by_q, _, _ = self._of.gradients(_at_rest(states), times, columns)
-        return by_q, None, None
+    def gradients(self, states: States, times: Indices, columns: Indices) -> Parts:
+        """Derivatives (K, n), of most with respect to q alone."""
+        return self._of.gradients_at_rest(states, times, columns)
 
     def independent_margins(self, states: States) -> Array | None:
         """By the constraint's second way, with v and a zero."""
-        return self._of.independent_margins(_at_rest(states))
-
-
-def _at_rest(states: States) -> States:
-    return States(states.kinematics, states.q, 0.0 * states.v, 0.0 * states.a)
+        return self._of.independent_margins(at_rest(states))

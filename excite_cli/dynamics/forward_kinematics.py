@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from excite_cli.kernels.compiled import KERNELS
 from excite_cli.robot.model import Robot
+from excite_cli.trajectory.base import Trajectory
 
 Array = NDArray[np.float64]
 
@@ -152,12 +153,35 @@ def _levels(parents: list[int]) -> list[_Level]:
 
 @dataclass(frozen=True)
 class States:
-    """q, v, a (T, n) of the moved joints; placements and motion columns are computed once."""
+    """q, v, a (T, n) of the moved joints; placements and motion columns are computed once.
+
+    `jerk` (T, n), the third derivative of q, is known of motions and of what stands still.
+    """
 
     kinematics: BatchKinematics
     q: Array
     v: Array
     a: Array
+    jerk: Array | None = None
+
+    @classmethod
+    def along(
+        cls, kinematics: BatchKinematics, trajectory: Trajectory, coefficients: Array, times: Array
+    ) -> "States":
+        """Those of a motion with coefficients (K, n) at `times` (T,) [s]."""
+        return cls(kinematics, *trajectory.orders(times, coefficients))
+
+    @classmethod
+    def still(cls, kinematics: BatchKinematics, q: Array) -> "States":
+        """Standing still at every one of `q` (T, n)."""
+        zero = np.zeros_like(q, dtype=float)
+        return cls(kinematics, q, zero, zero, zero)
+
+    def order(self, k: int) -> Array:
+        """The derivative (T, n) of q of order k: 0 to 3."""
+        found = (self.q, self.v, self.a, self.jerk)[k]
+        assert found is not None, "jerk is known of motions only"
+        return found
 
     @cached_property
     def placements(self) -> tuple[Array, Array]:

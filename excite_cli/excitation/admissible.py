@@ -66,7 +66,7 @@ def path_of(problem: Problem, trajectory: Trajectory, coefficients: Array) -> Pa
     """A motion of the problem's robot, to be judged; `trajectory` need not be the problem's."""
 
     def states_at(times: Array) -> States:
-        return States(problem.kinematics, *trajectory.states(times, coefficients))
+        return States.along(problem.kinematics, trajectory, coefficients, times)
 
     return Path(problem.robot, trajectory, coefficients, states_at)
 

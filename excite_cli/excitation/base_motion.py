@@ -88,7 +88,7 @@ def chosen_rows(task: MotionTask, states: States, chosen: list[Mask]) -> Array:
     for index, mask in enumerate(chosen):
         rows = task.residuals.rows(states, index, mask)
         block = np.zeros((len(rows.times), task.n, task.k))
-        for part, order in zip(rows.parts, orders, strict=True):
+        for part, order in zip(rows.parts, orders, strict=False):
             if part is not None:
                 block += part[:, :, None] * order[rows.times][:, None, :]
         blocks.append(block.reshape(len(rows.times), task.size))

@@ -31,8 +31,9 @@ _GROWTH, _DURATIONS = 1.15, 40
 _SHORTEST = 0.1  # [s]
 _SAME = 1e-9  # [rad, m]
 _ROUGH = 60  # instants that are looked at before a judge is asked
-# Largest speed and acceleration of the polynomial from rest to rest over a unit of way and time.
-_SPEED, _ACCELERATION = 15 / 8, 10 / np.sqrt(3)
+# Largest derivatives of the polynomial from rest to rest over a unit of way and time, by their
+# order: 10 s³ − 15 s⁴ + 6 s⁵ has 15/8 at s = 1/2, 10/√3 at s = 1/2 ± 1/√12, 60 at the ends.
+_LARGEST = {Quantity.VELOCITY: 15 / 8, Quantity.ACCELERATION: 10 / np.sqrt(3), Quantity.JERK: 60.0}
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ def broken(
 ) -> str | None:
     """The constraint that is broken most, in words, at so many instants; None if all are kept."""
     times = np.linspace(0.0, trajectory.duration, instants)
-    states = States(problem.kinematics, *trajectory.states(times, coefficients))
+    states = States.along(problem.kinematics, trajectory, coefficients, times)
     lowest, words = 0.0, None
     for constraint in problem.constraints:
         margins = constraint.margins_within(states, np.zeros_like(constraint.scale))
@@ -146,15 +147,14 @@ def resting_way(
 
 
 def _durations(problem: Problem, start: State, end: State) -> Iterator[float]:
-    """From the shortest that speeds and accelerations may allow, each longer by a fixed share."""
+    """From the shortest that limits of derivatives may allow, each longer by a fixed share."""
     away, shortest = np.abs(end.q - start.q), _SHORTEST
     if start.at_rest and end.at_rest:
         for constraint in problem.constraints:
             columns = constraint.linear
-            if columns is not None and columns.quantity != Quantity.POSITION:
+            if columns is not None and columns.quantity in _LARGEST:
                 way = away[columns.joints] / columns.bounds
-                at_speed = columns.quantity == Quantity.VELOCITY
-                needed = way * _SPEED if at_speed else np.sqrt(way * _ACCELERATION)
+                needed = (way * _LARGEST[columns.quantity]) ** (1 / columns.quantity)
                 shortest = max(shortest, float(needed.max(initial=0.0)) * (1 + 1e-9))
     for power in range(_DURATIONS):
         yield shortest * _GROWTH**power

@@ -16,7 +16,7 @@ def closest_time(problem: Problem, segment: Segment, rate: float = 100.0) -> flo
     """When [s] least is left of the distances that are kept; 0 if there are none."""
     duration = segment.trajectory.duration
     times = np.linspace(0.0, duration, max(2, int(np.ceil(duration * rate)) + 1))
-    states = States(problem.kinematics, *segment.trajectory.states(times, segment.coefficients))
+    states = States.along(problem.kinematics, segment.trajectory, segment.coefficients, times)
     found = [
         constraint.margins(states).min(axis=1)
         for constraint in problem.constraints

@@ -53,7 +53,7 @@ class FreeSpace:
     def free(self, postures: Array) -> Mask:
         """Which of the postures (P, n) have the room."""
         found = np.ones(len(postures), dtype=bool)
-        states = _still(self.problem, postures)
+        states = States.still(self.problem.kinematics, postures)
         for constraint, least in zip(self.problem.constraints, self.least, strict=True):
             margins = constraint.margins_within(states, least)
             found &= (margins >= least).all(axis=1)
@@ -267,10 +267,5 @@ def lengths(problem: Problem, way: Array) -> Array:
 
 def standing_margins(problem: Problem, postures: Array) -> list[Array]:
     """Margins (P, m) of every constraint, standing still at the postures (P, n)."""
-    states = _still(problem, postures)
+    states = States.still(problem.kinematics, postures)
     return [constraint.margins(states) for constraint in problem.constraints]
-
-
-def _still(problem: Problem, postures: Array) -> States:
-    zero = np.zeros_like(postures)
-    return States(problem.kinematics, postures, zero, zero)

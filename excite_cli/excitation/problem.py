@@ -183,7 +183,7 @@ class Problem(Shown):
 
     def states(self, coefficients: Array, basis: Basis | None = None) -> States:
         """Joint states on the constraint grid, or on `basis`."""
-        return States(self.kinematics, *(basis or self.constraint_basis).states(coefficients))
+        return States(self.kinematics, *(basis or self.constraint_basis).orders(coefficients))
 
     def still(self, q: Array) -> Array:
         """Coefficients of standing at `q` (n,)."""

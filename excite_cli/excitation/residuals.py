@@ -9,14 +9,14 @@ weighted sums over thousands of rows collapse to one matrix product per pair of 
 Σ_t (b_t b_tᵀ) ⊗ G_t.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.constraints.base import Array, Constraint, Indices
+from excite_cli.constraints.base import Array, Constraint, Indices, Parts
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.kernels.compiled import KERNELS
 from excite_cli.trajectory.base import Basis
@@ -33,40 +33,40 @@ class ResidualDerivatives:
 
     times: Indices
     columns: Indices
-    parts: tuple[Array | None, Array | None, Array | None]
+    parts: Parts
 
 
 class GridProducts:
     """Products of basis functions on the constraint grid, reduced to the free directions."""
 
     def __init__(self, basis: Basis, free: Array) -> None:
-        self.orders = tuple(
-            np.ascontiguousarray(order @ free)
-            for order in (basis.position, basis.velocity, basis.acceleration)
-        )
+        self.orders = tuple(np.ascontiguousarray(order @ free) for order in basis.by_order)
         self.samples, self.size = self.orders[0].shape
+        self._squares: dict[tuple[int, int], Array] = {}
 
-    @cached_property
-    def squares(self) -> dict[tuple[int, int], Array]:
-        """b_t b_t'ᵀ for every pair of orders: (T, K²), or the lower half of it where they agree."""
-        found = {}
-        low, high = np.tril_indices(self.size)
-        for i in range(3):
-            found[i, i] = self.orders[i][:, low] * self.orders[i][:, high]
-            for j in range(i + 1, 3):
+    def squares(self, i: int, j: int) -> Array:
+        """b_t b_t'ᵀ of a pair of orders i ≤ j: (T, K²), or the lower half of it where they agree.
+
+        Only of pairs that are asked for: jerk stands beside no other order.
+        """
+        if (i, j) not in self._squares:
+            if i == j:
+                low, high = np.tril_indices(self.size)
+                self._squares[i, j] = self.orders[i][:, low] * self.orders[i][:, high]
+            else:
                 both = self.orders[i][:, :, None] * self.orders[j][:, None, :]
-                found[i, j] = both.reshape(self.samples, -1)
-        return found
+                self._squares[i, j] = both.reshape(self.samples, -1)
+        return self._squares[i, j]
 
-    def add_gradient(self, gradient: Array, per_instant: list[Array | None]) -> None:
-        """Add Σ_t b_t g_tᵀ to `gradient` (K, n), `per_instant` being (T, n) per order."""
-        for order, part in zip(self.orders, per_instant, strict=True):
+    def add_gradient(self, gradient: Array, per_instant: Sequence[Array | None]) -> None:
+        """Add Σ_t b_t g_tᵀ to `gradient` (K, n); `per_instant`: (T, n) per order, from q on."""
+        for order, part in zip(self.orders, per_instant, strict=False):
             if part is not None:
                 gradient += order.T @ part
 
     def add_joint_curvature(self, hessian: Array, order: int, weights: Array) -> None:
         """Add the blocks of separate joints: weights (T, n) on the squared basis."""
-        blocks = (self.squares[order, order].T @ weights)[_unfolded(self.size)]
+        blocks = (self.squares(order, order).T @ weights)[_unfolded(self.size)]
         joints = np.arange(weights.shape[1])
         hessian[joints, :, joints, :] += blocks.transpose(2, 0, 1)
 
@@ -80,12 +80,12 @@ class GridProducts:
         even = [pair for pair in weights if pair[0] == pair[1]]
         mixed = [pair for pair in weights if pair[0] != pair[1]]
         if even:  # symmetric in the basis and in the joints: a quarter of the products
-            blocks = sum(weights[pair][:, low, high].T @ self.squares[pair] for pair in even)
+            blocks = sum(weights[pair][:, low, high].T @ self.squares(*pair) for pair in even)
             blocks = np.asarray(blocks)[_unfolded(n)][:, :, _unfolded(k)]
             hessian += blocks.transpose(0, 2, 1, 3)
         if mixed:
             flat = sum(
-                weights[pair].reshape(self.samples, -1).T @ self.squares[pair] for pair in mixed
+                weights[pair].reshape(self.samples, -1).T @ self.squares(*pair) for pair in mixed
             )
             blocks = np.ascontiguousarray(
                 np.asarray(flat).reshape(n, n, k, k).transpose(0, 2, 1, 3)
@@ -126,8 +126,8 @@ class Residuals:
         times, columns = np.nonzero(near)
         parts = constraint.gradients(states, times, columns)
         scale = constraint.scale[columns][:, None]
-        scaled = [None if part is None else part / scale for part in parts]
-        return ResidualDerivatives(times, columns, (scaled[0], scaled[1], scaled[2]))
+        scaled = tuple(None if part is None else part / scale for part in parts)
+        return ResidualDerivatives(times, columns, scaled)
 
 
 def summed_per_instant(

@@ -196,8 +196,7 @@ def _blend(task: MotionTask, posture: Array, rng: np.random.Generator, spread: f
 
 
 def _still(task: MotionTask, posture: Array) -> States:
-    zero = np.zeros((1, task.n))
-    return States(task.problem.kinematics, posture[None], zero, zero)
+    return States.still(task.problem.kinematics, posture[None])
 
 
 def _standing(task: MotionTask, posture: Array) -> Array:

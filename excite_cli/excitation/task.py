@@ -97,14 +97,14 @@ class MotionTask:
 
     @cached_property
     def metric(self) -> Array:
-        """M (size, size): xᵀ M x is the mean square of q, v, a in units of their bounds.
+        """M (size, size): xᵀ M x is the mean square of q, v, a, jerk in units of their bounds.
 
         The natural length of a change of a motion. A thousandth of rad² (m²) is added for every
         joint, and of (rad/s²)² where acceleration is free, so that it is positive definite.
         """
         grid = self.residuals.grid
         metric = np.zeros((self.n, self.k, self.n, self.k))
-        weights = np.zeros((3, self.n))
+        weights = np.zeros((4, self.n))
         for constraint in self.problem.constraints:
             columns = constraint.linear
             if columns is not None:
@@ -113,7 +113,7 @@ class MotionTask:
                 weights[columns.quantity] += inverse
         weights[0] += 1e-3
         weights[2, weights[2] == 0] += 1e-3
-        for order in range(3):
+        for order in np.flatnonzero(weights.any(axis=1)).tolist():
             per_instant = np.tile(weights[order] / grid.samples, (grid.samples, 1))
             grid.add_joint_curvature(metric, order, per_instant)
         return metric.reshape(self.size, self.size)
@@ -144,7 +144,7 @@ def _within_ends(problem: Problem, guards: list[Array]) -> list[Array]:
     ends = problem.boundary.postures
     if not len(ends):
         return guards
-    still = States(problem.kinematics, ends, np.zeros_like(ends), np.zeros_like(ends))
+    still = States.still(problem.kinematics, ends)
     margins = [constraint.margins(still).min(axis=0) for constraint in problem.constraints]
     return [
         np.minimum(guard, 0.5 * np.maximum(margin, 0.0))

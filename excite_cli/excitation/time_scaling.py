@@ -1,13 +1,14 @@
-"""The same path, slower: speeds fall with the pace c, accelerations with its square.
+"""The same path, slower: its derivative of order k falls with the power k of the pace c.
 
-With |v_j(t)| ≤ share·v_max,j and |a_j(t)| ≤ share·a_max,j required at every instant,
+With |x_j(t)| ≤ share·x_max,j required of speeds, accelerations and jerks at every instant,
 
-    c = min(1, min_j share·v_max,j / max_t|v_j|, min_j √(share·a_max,j / max_t|a_j|))
+    c = min(1, min_{k,j} (share·x_max,kj / max_t|x_kj|)^(1/k)),      k = 1, 2, 3
 
-The largest speeds and accelerations are bounds over whole intervals of time (Taylor models), so
-that the limits hold between samples too. Torques of rigid bodies, τ = τ_g + c²·(τ₁ − τ_g),
+The largest derivatives are bounds over whole intervals of time (Taylor models), so that the limits
+hold between samples too. Torques of rigid bodies, τ = τ_g + c²·(τ₁ − τ_g),
 lie between those of standing still at the same posture, τ_g, and those of the original, τ₁: a slow
-motion can break a bound on torque only where standing still breaks it.
+motion can break a bound on torque only where standing still breaks it (or, of a motor that has less
+torque at speed, would break it with that of the motion's speed).
 """
 
 from collections.abc import Sequence
@@ -30,24 +31,23 @@ _CHUNK = 4000
 
 @dataclass(frozen=True)
 class PaceLimits:
-    """Largest speed and acceleration (n,) of every joint, infinite where there is no bound."""
+    """Largest speed, acceleration and jerk (3, n) of joints, infinite where there is no bound."""
 
-    velocity: Array
-    acceleration: Array
+    largest: Array
 
     @classmethod
     def of(cls, constraints: Sequence[Constraint], n: int) -> "PaceLimits":
         """From the joint bounds among `constraints`; the nearer one where two sides differ."""
-        found = {Quantity.VELOCITY: np.full(n, np.inf), Quantity.ACCELERATION: np.full(n, np.inf)}
+        found = np.full((3, n), np.inf)
         for constraint in constraints:
             columns = constraint.linear
-            if columns is not None and columns.quantity in found:
-                np.minimum.at(found[columns.quantity], columns.joints, columns.bounds)
-        return cls(found[Quantity.VELOCITY], found[Quantity.ACCELERATION])
+            if columns is not None and columns.quantity != Quantity.POSITION:
+                np.minimum.at(found[columns.quantity - 1], columns.joints, columns.bounds)
+        return cls(found)
 
 
 def slowing(limits: PaceLimits, trajectory: Trajectory, coefficients: Array, share: float) -> float:
-    """The pace c, at most 1, at which speeds and accelerations keep `share` of their limits.
+    """The pace c, at most 1, at which derivatives keep `share` of their limits.
 
     Raises
     ------
@@ -56,17 +56,14 @@ def slowing(limits: PaceLimits, trajectory: Trajectory, coefficients: Array, sha
     """
     if not _LEAST <= share <= 1.0:
         raise ConfigError(f"--slow {share:g}: give a share of the limits from {_LEAST:g} to 1.")
-    both = np.concatenate([limits.velocity, limits.acceleration])
-    if not np.isfinite(both).any():
+    if not np.isfinite(limits.largest).any():
         raise ConfigError(
-            "--slow: the config gives no limits of speed or acceleration to keep a share of. Set "
-            "constraints.joint_limits.velocity or .acceleration."
+            "--slow: the config gives no limits of speed, acceleration or jerk to keep a share of. "
+            "Set constraints.joint_limits.velocity, .acceleration or .jerk."
         )
-    velocity, acceleration = largest(trajectory, coefficients)
     with np.errstate(divide="ignore"):
-        by_speed = share * limits.velocity / velocity
-        by_acceleration = np.sqrt(share * limits.acceleration / acceleration)
-    return float(min(1.0, by_speed.min(), by_acceleration.min()))
+        allowed = share * limits.largest / largest(trajectory, coefficients)
+    return float(min(1.0, (allowed ** (1 / np.arange(1, 4))[:, None]).min()))
 
 
 def slowed_chain(limits: PaceLimits, chain: Chain, share: float) -> tuple[Chain, float]:
@@ -83,14 +80,15 @@ def slowed_chain(limits: PaceLimits, chain: Chain, share: float) -> tuple[Chain,
     return Chain(tuple(segments)), pace
 
 
-def largest(trajectory: Trajectory, coefficients: Array) -> tuple[Array, Array]:
-    """Bounds (n,) on the speed and acceleration of every joint, at every instant."""
+def largest(trajectory: Trajectory, coefficients: Array) -> Array:
+    """Bounds (3, n) on the speed, acceleration and jerk of every joint, at every instant."""
     intervals = intervals_of(trajectory, trajectory.duration / _INTERVALS)
-    velocity, acceleration = np.zeros((2, coefficients.shape[1]))
+    found = np.zeros((3, coefficients.shape[1]))
     for begin in range(0, len(intervals), _CHUNK):
         some: Intervals = intervals.only(slice(begin, begin + _CHUNK))
         states = enclosed_states(trajectory, coefficients, some)
-        for found, enclosed in ((velocity, states.v), (acceleration, states.a)):
+        for order in (1, 2, 3):
+            enclosed = states.order(order)
             size = np.maximum(np.abs(enclosed.upper()), np.abs(enclosed.lower()))
-            np.maximum(found, size.max(axis=0), out=found)
-    return velocity, acceleration
+            np.maximum(found[order - 1], size.max(axis=0), out=found[order - 1])
+    return found

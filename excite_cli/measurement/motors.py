@@ -42,7 +42,7 @@ class Motors:
         return {name: joint for name, joint in pairs if name != joint}
 
     def bounds(self, key: str) -> Array:
-        """Limits `velocity`, `acceleration` or `effort` (n,) of the motors; infinite without."""
+        """Limits (n,) of the motors by their key, `velocity` to `effort`; infinite without."""
         given = (getattr(self.limits.get(name), key, None) for name in self.names)
         return np.array([np.inf if value is None else float(value) for value in given])
 

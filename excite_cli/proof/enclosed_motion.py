@@ -69,7 +69,7 @@ class EnclosedMotion:
     def at_rest(self) -> "EnclosedMotion":
         """The robot standing still wherever it may be in an interval; it shares where that is."""
         still = Taylor.constant(np.zeros(self.states.q.shape))
-        states = replace(self.states, v=still, a=still)
+        states = replace(self.states, v=still, a=still, jerk=still)
         found = EnclosedMotion(self.robot, states)
         found.__dict__.update(placements=self.placements, axes=self.axes)
         return found
@@ -160,8 +160,8 @@ class EnclosedMotion:
 def _of_all(robot: Robot, states: EnclosedStates) -> EnclosedStates:
     if robot.coupling is None:
         return states
-    q, v, a = (part.through(robot.coupling.matrix) for part in (states.q, states.v, states.a))
-    return EnclosedStates(q + robot.coupling.offset, v, a)
+    q, *rates = (states.order(k).through(robot.coupling.matrix) for k in range(4))
+    return EnclosedStates(q + robot.coupling.offset, *rates)
 
 
 def _joints_of(robot: Robot) -> tuple[_Joint, ...]:

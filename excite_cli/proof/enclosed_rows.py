@@ -30,13 +30,18 @@ from excite_cli.proof.taylor import Array, Taylor, cross, dot, joined, stacked
 # the middle, ‖E y‖₂ ≤ e·E y + ‖the rest‖² / (2 e·E y).
 
 
-def least_of(y: Taylor, uncertainty: InertiaUncertainty) -> Array:
-    """Lower bounds (T, m) on y·φ throughout each interval, for functionals y (T, m, P)."""
-    return np.max([_piece_least(y, piece) for piece in uncertainty.pieces], axis=0)
+def least_of(y: Taylor, uncertainty: InertiaUncertainty, beside: Taylor | None = None) -> Array:
+    """Lower bounds (T, m) on y·φ + b throughout each interval, for functionals y (T, m, P).
+
+    `beside`: b (T, m), which changes with time as y does; None: zero.
+    """
+    return np.max([_piece_least(y, piece, beside) for piece in uncertainty.pieces], axis=0)
 
 
-def _piece_least(y: Taylor, piece: Piece) -> Array:
+def _piece_least(y: Taylor, piece: Piece, beside: Taylor | None) -> Array:
     middle = y.through(piece.center[None])[..., 0]
+    if beside is not None:
+        middle = middle + beside
     if np.any(piece.corners):
         spread = y.scaled(piece.corners) if piece.corners.ndim == 1 else y.through(piece.corners)
         middle = middle - _sum_of_sizes(spread)

@@ -1,4 +1,4 @@
-"""Positions, velocities and accelerations of a trajectory over whole intervals of time.
+"""Positions and their first three derivatives of a trajectory over whole intervals of time.
 
 About the middle t_c of an interval of half width h, with t = t_c + s h,
 
@@ -6,7 +6,8 @@ About the middle t_c of an interval of half width h, with t = t_c + s h,
 
 For a polynomial piece of degree D (B-splines between knots) e is zero; for a Fourier series the
 last derivative has a bound for all times, the sum of its amplitudes. Terms beyond s² go into the
-radius of the enclosure. The same with the derivatives moved on by one and by two gives v and a.
+radius of the enclosure. The same with the derivatives moved on by one, two and three gives v, a and
+jerk. Intervals end at the breaks of a trajectory, so that jerk may jump there.
 """
 
 from dataclasses import dataclass
@@ -43,11 +44,16 @@ class Intervals:
 
 @dataclass(frozen=True)
 class EnclosedStates:
-    """q, v, a of the moved joints over intervals, each enclosing (T, n)."""
+    """q, v, a and jerk of the moved joints over intervals, each enclosing (T, n)."""
 
     q: Taylor
     v: Taylor
     a: Taylor
+    jerk: Taylor
+
+    def order(self, k: int) -> Taylor:
+        """The derivative of q of order k: 0 to 3."""
+        return (self.q, self.v, self.a, self.jerk)[k]
 
 
 def intervals_of(trajectory: Trajectory, width: float) -> Intervals:
@@ -65,10 +71,10 @@ def intervals_of(trajectory: Trajectory, width: float) -> Intervals:
 def enclosed_states(
     trajectory: Trajectory, coefficients: Array, intervals: Intervals
 ) -> EnclosedStates:
-    """What q, v and a can be in each of the intervals."""
+    """What q, v, a and jerk can be in each of the intervals."""
     derivatives = trajectory.derivatives(intervals.middles, coefficients)
     beyond, h = trajectory.beyond(coefficients), intervals.halves[:, None]
-    found = [_enclosed(derivatives[shift:], beyond, h) for shift in range(3)]
+    found = [_enclosed(derivatives[shift:], beyond, h) for shift in range(4)]
     return EnclosedStates(*found)
 
 

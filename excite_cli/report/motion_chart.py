@@ -1,9 +1,10 @@
-"""A motion joint by joint: position within its limits, speed and acceleration as shares."""
+"""A motion joint by joint: position within its limits, its derivatives and torque as shares."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from excite_cli.constraints.joint_columns import Quantity
 from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
@@ -12,13 +13,13 @@ from excite_cli.report.plot import Curve, Panel, Plot
 from excite_cli.robot.model import Array
 from excite_cli.shown.answer import Table
 
-_WORDS = ("position", "speed", "acceleration", "torque")
-_COLOURS: tuple[Colour, ...] = ("blue", "vermilion", "green", "purple")
+_WORDS = ("position", "speed", "acceleration", "jerk", "torque")
+_COLOURS: tuple[Colour, ...] = ("blue", "vermilion", "green", "ink", "purple")
 
 
 @dataclass(frozen=True)
 class Signals:
-    """Position, velocity, acceleration and torque (4, T, n) of a motion with bounds (4, n).
+    """Position to jerk, then torque (5, T, n) of a motion, by `Quantity`, with bounds (5, n).
 
     Lower bounds of all but positions are minus the upper ones; infinite where there is none.
     """
@@ -34,24 +35,25 @@ def signals_of(problem: Problem, motion: Motion, points: int) -> Signals:
     """At so many instants, evenly."""
     robot = problem.robot
     times = np.linspace(0.0, problem.trajectory.duration, points)
-    q, v, a = problem.trajectory.basis(times).states(motion.coefficients)
+    q, v, a, jerk = problem.trajectory.orders(times, motion.coefficients)
     torque = InverseDynamics(robot).torques(q, v, a)[:, -robot.n :]
-    lower = np.full((4, robot.n), -np.inf)
+    lower = np.full((len(Quantity), robot.n), -np.inf)
     upper = -lower
     for constraint in problem.constraints:
         columns = constraint.of_joints
         if columns is not None:
             columns.put_into(lower[columns.quantity], upper[columns.quantity])
     units = tuple(
-        ("m", "m/s", "m/s²", "N") if slides else ("rad", "rad/s", "rad/s²", "N·m")
+        ("m", "m/s", "m/s²", "m/s³", "N") if slides else ("rad", "rad/s", "rad/s²", "rad/s³", "N·m")
         for slides in robot.sliding
     )
-    return Signals(times, np.stack([q, v, a, torque]), lower, upper, units)
+    return Signals(times, np.stack([q, v, a, jerk, torque]), lower, upper, units)
 
 
 def _shown(signals: Signals, joint: int) -> list[int]:
-    """Orders drawn as shares: speed and acceleration, and the torque where it is bounded."""
-    return [1, 2, 3] if np.isfinite(signals.upper[3, joint]) else [1, 2]
+    """What is drawn as shares: speed and acceleration; jerk and torque where they are bounded."""
+    bounded = (k for k in (Quantity.JERK, Quantity.TORQUE) if np.isfinite(signals.upper[k, joint]))
+    return [Quantity.VELOCITY, Quantity.ACCELERATION, *bounded]
 
 
 def motion_cards(problem: Problem, signals: Signals, motion: int) -> tuple[Plot, ...]:
@@ -123,10 +125,11 @@ def _bound(limit: float) -> str:
 def peaks_table(problem: Problem, signals: Signals) -> Table:
     """What every joint does at most, with the share of its limit."""
     rows = []
+    told = [1, 2, 3, 4] if np.isfinite(signals.upper[Quantity.JERK]).any() else [1, 2, 4]
     for joint, name in enumerate(problem.robot.joint_names):
         q, unit = signals.values[0, :, joint], signals.units[joint][0]
         limits = f"{_bound(signals.lower[0, joint])} … {_bound(signals.upper[0, joint])}"
-        peaks = {f"peak {_WORDS[order]}": _peak(signals, order, joint) for order in (1, 2, 3)}
+        peaks = {f"peak {_WORDS[order]}": _peak(signals, order, joint) for order in told}
         position = f"{in_figures(float(q.min()))} … {in_figures(float(q.max()))} {unit}"
         rows.append({"joint": name, "position": position, "limits": limits, **peaks})
     return Table.of(

@@ -36,8 +36,8 @@ def posture_chart(problem: Problem, motion: Motion) -> Chart:
     """The robot where its first `motion` has least room."""
     segment = Segment("", problem.trajectory, motion.coefficients)
     at = closest_time(problem, segment)
-    states = States(
-        problem.kinematics, *problem.trajectory.states(np.array([at]), motion.coefficients)
+    states = States.along(
+        problem.kinematics, problem.trajectory, motion.coefficients, np.array([at])
     )
     poses = Poses.of(problem.robot, states.q)
     margins = [constraint.margins(states) for constraint in problem.constraints]

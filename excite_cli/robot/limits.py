@@ -1,20 +1,22 @@
 """Limits of the moved joints; those of joints that follow others narrow their driver's.
 
 Where joint f follows d, q_f = m q_d + c, the limits of f hold if q_d stays between (l_f − c)/m and
-(u_f − c)/m, |v_d| below v_f/|m| and |a_d| below a_f/|m|. Torque is that of the driver's row, which
-carries all that follows it.
+(u_f − c)/m, and speed, acceleration and jerk of d below those of f over |m|. Torque is that of the
+driver's row, which carries all that follows it.
 """
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.config.robot_spec import JointLimits
+from excite_cli.config.limit_presets import LIMIT_PRESETS
+from excite_cli.config.robot_spec import JointLimits, RobotSpec
 from excite_cli.errors import ConfigError, RobotError
+from excite_cli.robot.effort_curve import EffortCurve
 from excite_cli.robot.mimic import Mimic
 
 # Position limits as the file of a robot writes them, whatever its format.
@@ -66,13 +68,22 @@ _TURN = np.pi
 
 @dataclass(frozen=True)
 class Limits:
-    """Bounds of the moved joints, each of shape (n,); infinite where there is none."""
+    """Bounds of the moved joints, each (n,); infinite where there is none.
+
+    `curves` (n,): torque by speed, a constant for most.
+    """
 
     lower: Array
     upper: Array
     velocity: Array
     acceleration: Array
-    effort: Array
+    jerk: Array
+    curves: tuple[EffortCurve, ...]
+
+    @property
+    def effort(self) -> Array:
+        """Torque (n,) [N·m or N] at no speed."""
+        return np.array([curve.efforts[0] for curve in self.curves])
 
     def ranges(self) -> tuple[Array, Array]:
         """Finite positions (n,) to draw between: a turn where there is no bound, or only one."""
@@ -93,7 +104,8 @@ class JointRange:
     upper: float
     velocity: float
     acceleration: float = np.inf
-    effort: float = np.inf
+    jerk: float = np.inf
+    effort: EffortCurve = field(default_factory=lambda: EffortCurve.constant(np.inf))
     known: bool = True
     held: bool = False
 
@@ -103,19 +115,27 @@ class JointRange:
     ) -> "JointRange":
         """As the file of a robot gives it, its limits in order."""
         known = not lower == upper == 0.0
-        return cls(lower, upper, velocity, np.inf, effort, known, known and lower == upper)
+        held = known and lower == upper
+        curve = EffortCurve.constant(effort)
+        return cls(lower, upper, velocity, effort=curve, known=known, held=held)
 
     def given(self, own: JointLimits | None) -> "JointRange":
         """With those that the config gives in place of the URDF's."""
         if own is None:
             return self
         lower, upper = own.position or (self.lower, self.upper)
+        effort = self.effort
+        if own.effort is not None:
+            effort = EffortCurve.constant(own.effort)
+        elif own.effort_by_speed is not None:
+            effort = EffortCurve(*np.array(own.effort_by_speed).T)
         return JointRange(
             lower,
             upper,
             own.velocity or self.velocity,
             own.acceleration or self.acceleration,
-            own.effort or self.effort,
+            own.jerk or self.jerk,
+            effort,
             self.known or own.position is not None,
             self.held and own.position is None,
         )
@@ -135,6 +155,7 @@ class JointRange:
             upper=upper,
             velocity=min(self.velocity, follower.velocity / abs(m)),
             acceleration=min(self.acceleration, follower.acceleration / abs(m)),
+            jerk=min(self.jerk, follower.jerk / abs(m)),
             held=(self.held or follower.held) and lower == upper,
         )
 
@@ -142,8 +163,34 @@ class JointRange:
 def limits_of(names: tuple[str, ...], ranges: Mapping[str, JointRange]) -> Limits:
     """Of these joints, in their order."""
     found = [ranges[name] for name in names]
-    columns = ("lower", "upper", "velocity", "acceleration", "effort")
-    return Limits(*(np.array([getattr(one, key) for one in found]) for key in columns))
+    columns = ("lower", "upper", "velocity", "acceleration", "jerk")
+    bounds = {key: np.array([getattr(one, key) for one in found]) for key in columns}
+    return Limits(**bounds, curves=tuple(one.effort for one in found))
+
+
+def given_limits(spec: RobotSpec, names: Sequence[str]) -> dict[str, JointLimits]:
+    """What the config gives for joints among `names`, over those of its preset.
+
+    Raises
+    ------
+    ConfigError
+        The robot lacks joints of the robot that the preset is of.
+    """
+    if spec.limits_preset is None:
+        return spec.limits
+    preset, found = LIMIT_PRESETS[spec.limits_preset], dict(spec.limits)
+    if missing := preset.missing(names):
+        raise ConfigError(
+            f"robot.limits_preset: {preset.title} has {len(preset.joints)} joints, but no joint of "
+            f"this robot is called as its joint {', '.join(missing)} is. Joints: "
+            f"{', '.join(names)}. Give limits under robot.limits.<joint>."
+        )
+    for name, values in preset.of_joints(names):
+        own = spec.limits.get(name, JointLimits()).model_dump(exclude_none=True)
+        dropped = {"effort"} if "effort_by_speed" in own else set()
+        both = {key: value for key, value in values.items() if key not in dropped} | own
+        found[name] = JointLimits.model_validate(both)
+    return found
 
 
 def check_range(name: str, own: JointRange, kept: JointRange, followers: list[str]) -> None:

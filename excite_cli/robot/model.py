@@ -22,7 +22,14 @@ from excite_cli.robot.base_joints import BASE_JOINTS, on_base_joints
 from excite_cli.robot.carried_payload import CarriedPayload, add_payload, payload_on
 from excite_cli.robot.coupling import Coupling
 from excite_cli.robot.description import RobotDescription, load_description
-from excite_cli.robot.limits import UNBOUNDED, JointRange, Limits, check_range, limits_of
+from excite_cli.robot.limits import (
+    UNBOUNDED,
+    JointRange,
+    Limits,
+    check_range,
+    given_limits,
+    limits_of,
+)
 from excite_cli.robot.mimic import Mimic
 from excite_cli.robot.parsed_model import parsed_model, reduced_model
 from excite_cli.robot.posture import posture_of, require_known
@@ -310,7 +317,8 @@ def _built(description: RobotDescription, spec: RobotSpec) -> Robot:
     # Joints of the base that slide or float stand still at neutral: they have no single value.
     others = [name for name in names if not _is_single(full, name)]
     names = [name for name in names if name not in others]
-    alone = {name: _range_of(full, name).given(spec.limits.get(name)) for name in names}
+    given = given_limits(spec, names)
+    alone = {name: _range_of(full, name).given(given.get(name)) for name in names}
     kept = _kept_ranges(alone, {n: own for n, own in mimicking.items() if n in names})
     chosen = asked if spec.joints != "all" else _not_held(asked, kept, description)
     followers = {

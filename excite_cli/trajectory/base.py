@@ -17,12 +17,18 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Basis:
-    """Basis functions at T instants and their first two time derivatives, each (T, K)."""
+    """Basis functions at T instants and their first three time derivatives, each (T, K)."""
 
     times: Array
     position: Array
     velocity: Array
     acceleration: Array
+    jerk: Array
+
+    @property
+    def by_order(self) -> tuple[Array, Array, Array, Array]:
+        """Position, velocity, acceleration, jerk."""
+        return self.position, self.velocity, self.acceleration, self.jerk
 
     def states(self, coefficients: Array) -> tuple[Array, Array, Array]:
         """q, v, a, each (T, n), for coefficients (K, n)."""
@@ -31,6 +37,10 @@ class Basis:
             self.velocity @ coefficients,
             self.acceleration @ coefficients,
         )
+
+    def orders(self, coefficients: Array) -> tuple[Array, Array, Array, Array]:
+        """q and its first three time derivatives, each (T, n), for coefficients (K, n)."""
+        return (*self.states(coefficients), self.jerk @ coefficients)
 
     def pull_back(self, gq: Array, gv: Array, ga: Array) -> Array:
         """Derivative (K, n) by the coefficients, from those by q, v, a (T, n)."""
@@ -48,13 +58,22 @@ class Trajectory(ABC):
     def n_coefficients(self) -> int:
         """K, the number of coefficients per joint."""
 
-    @abstractmethod
     def basis(self, times: Array) -> Basis:
         """Evaluate the basis at `times` (T,) [s]."""
+        times = np.asarray(times, dtype=float)
+        position, velocity, acceleration, jerk = (self.derivative(times, k) for k in range(4))
+        return Basis(times, position, velocity, acceleration, jerk)
+
+    def orders(self, times: Array, coefficients: Array) -> tuple[Array, Array, Array, Array]:
+        """q, v, a and jerk (T, n) at `times` (T,) [s]; where many coefficients, without a basis.
+
+        At an instant where jerk jumps, that of what follows.
+        """
+        return self.basis(times).orders(coefficients)
 
     def states(self, times: Array, coefficients: Array) -> tuple[Array, Array, Array]:
-        """q, v, a (T, n) at `times` (T,) [s]; families of many coefficients need no basis here."""
-        return self.basis(times).states(coefficients)
+        """q, v, a (T, n) at `times` (T,) [s]."""
+        return self.orders(times, coefficients)[:3]
 
     @abstractmethod
     def slowed(self, factor: float) -> "Trajectory":

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import BSpline
 
-from excite_cli.trajectory.base import Array, Basis, Trajectory
+from excite_cli.trajectory.base import Array, Trajectory
 
 
 @dataclass(frozen=True)
@@ -44,13 +44,6 @@ class BSplineTrajectory(Trajectory):
     def derivative(self, times: Array, order: int) -> Array:
         """Basis splines differentiated; instants beyond the end are evaluated at the end."""
         return np.asarray(self._splines[order](np.clip(times, 0.0, self.duration)))
-
-    def basis(self, times: Array) -> Basis:
-        """Basis splines; instants beyond the end are evaluated at the end."""
-        times = np.asarray(times, dtype=float)
-        inside = np.clip(times, 0.0, self.duration)
-        position, velocity, acceleration = (spline(inside) for spline in self._splines[:3])
-        return Basis(times, position, velocity, acceleration)
 
     def slowed(self, factor: float) -> "BSplineTrajectory":
         """A longer duration."""

@@ -13,7 +13,7 @@ from math import comb
 import numpy as np
 
 from excite_cli.shown.record import Shown
-from excite_cli.trajectory.base import Array, Basis, Trajectory
+from excite_cli.trajectory.base import Array, Trajectory
 from excite_cli.trajectory.fourier import FourierTrajectory
 from excite_cli.trajectory.slowed import Slowed
 
@@ -99,7 +99,7 @@ class Fade(Trajectory):
         return np.asarray(sign * value / self.duration**order)[:, None]
 
     def derivative(self, times: Array, order: int) -> Array:
-        """Leibniz' rule."""
+        """The motion's basis times w, then 1 − w, by Leibniz' rule."""
         times = np.asarray(times, dtype=float)
         of_motion = sum(
             comb(order, j) * self._weight(times, j) * self.motion.derivative(times, order - j)
@@ -107,11 +107,6 @@ class Fade(Trajectory):
         )
         of_posture = float(order == 0) - self._weight(times, order)
         return np.hstack([of_motion, of_posture])
-
-    def basis(self, times: Array) -> Basis:
-        """The motion's basis times w, then 1 − w."""
-        times = np.asarray(times, dtype=float)
-        return Basis(times, *(self.derivative(times, order) for order in range(3)))
 
     def beyond(self, coefficients: Array) -> Array:
         """Leibniz' rule with the largest value of each factor."""

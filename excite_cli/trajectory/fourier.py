@@ -36,6 +36,7 @@ class FourierTrajectory(Trajectory):
             position=np.hstack([sine, cosine, one]),
             velocity=np.hstack([cosine * rates, -sine * rates, zero]),
             acceleration=np.hstack([-sine * rates**2, -cosine * rates**2, zero]),
+            jerk=np.hstack([-cosine * rates**3, sine * rates**3, zero]),
         )
 
     @property

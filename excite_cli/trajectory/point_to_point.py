@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.trajectory.base import Array, Basis, Trajectory
+from excite_cli.trajectory.base import Array, Trajectory
 from excite_cli.trajectory.slowed import Slowed
 
 # Powers of s (rows, from 0 to 5) of each of the six polynomials (columns).
@@ -52,11 +52,6 @@ class PointToPoint(Trajectory):
             powers[:, power] = factor * share ** (power - order)
         scale = self.duration ** (_ORDERS_OF_TIME - order).astype(float)
         return np.asarray(powers @ _POWERS * scale)
-
-    def basis(self, times: Array) -> Basis:
-        """The six polynomials."""
-        times = np.asarray(times, dtype=float)
-        return Basis(times, *(self.derivative(times, order) for order in range(3)))
 
     def slowed(self, factor: float) -> Slowed:
         """The same at another pace."""

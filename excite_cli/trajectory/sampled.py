@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
-from excite_cli.trajectory.base import Array, Basis, Trajectory
+from excite_cli.trajectory.base import Array, Trajectory
 
 _DEGREE = 5
 # Monomials s⁰ … s⁵ from h v₀, h² a₀, q₁ − q₀, h v₁, h² a₁; q₀ is added to the first.
@@ -95,17 +95,17 @@ class SampledTrajectory(Trajectory):
             found[0] += q[index]
         return np.asarray(found)
 
-    def states(self, times: Array, coefficients: Array) -> tuple[Array, Array, Array]:
-        """q, v, a (T, n) from the two knots beside each instant; clamped to the ends."""
-        q, v, a = self._evaluated(times, coefficients, range(3))
-        return q, v, a
+    def orders(self, times: Array, coefficients: Array) -> tuple[Array, Array, Array, Array]:
+        """q, v, a, jerk (T, n) from the two knots beside each instant; clamped to the ends."""
+        q, v, a, jerk = self._evaluated(times, coefficients, range(4))
+        return q, v, a, jerk
 
     def derivatives(self, times: Array, coefficients: Array) -> Array:
         """q and its first five time derivatives (6, T, n), from the piece that begins at a knot."""
         return self._evaluated(times, coefficients, range(_DEGREE + 1))
 
     def derivative(self, times: Array, order: int) -> Array:
-        """Time derivative (T, K) of the basis, dense: for few knots only, see `states`."""
+        """Time derivative (T, K) of the basis, dense: for few knots only, see `orders`."""
         index, weights = self._weights(times, range(order, order + 1))
         count, rows = len(self.knots), np.arange(len(index))
         dense = np.zeros((len(index), self.n_coefficients))
@@ -115,11 +115,6 @@ class SampledTrajectory(Trajectory):
         dense[rows, index] = (order == 0) - gained
         dense[rows, index + 1] = gained
         return dense
-
-    def basis(self, times: Array) -> Basis:
-        """The dense basis: for few knots only, see `states`."""
-        times = np.asarray(times, dtype=float)
-        return Basis(times, *(self.derivative(times, order) for order in range(3)))
 
     def constant(self, q: Array) -> Array:
         """`q` at every knot, no speed, no acceleration."""

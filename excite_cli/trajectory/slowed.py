@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from excite_cli.trajectory.base import Array, Basis, Trajectory
+from excite_cli.trajectory.base import Array, Trajectory
 
 
 @dataclass(frozen=True)
@@ -42,16 +42,10 @@ class Slowed(Trajectory):
     def _inner(self, times: Array) -> Array:
         return np.asarray(times, dtype=float) * self.pace
 
-    def states(self, times: Array, coefficients: Array) -> tuple[Array, Array, Array]:
-        """States of the original at c·t, with v and a scaled."""
-        q, v, a = self.original.states(self._inner(times), coefficients)
-        return q, v * self.pace, a * self.pace**2
-
-    def basis(self, times: Array) -> Basis:
-        """Basis of the original at c·t, differentiated by t."""
-        basis = self.original.basis(self._inner(times))
-        velocity, acceleration = basis.velocity * self.pace, basis.acceleration * self.pace**2
-        return Basis(np.asarray(times, dtype=float), basis.position, velocity, acceleration)
+    def orders(self, times: Array, coefficients: Array) -> tuple[Array, Array, Array, Array]:
+        """Those of the original at c·t, each times its cᵏ."""
+        q, v, a, jerk = self.original.orders(self._inner(times), coefficients)
+        return q, v * self.pace, a * self.pace**2, jerk * self.pace**3
 
     def derivative(self, times: Array, order: int) -> Array:
         """That of the original at c·t, times cᵏ."""

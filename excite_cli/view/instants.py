@@ -55,7 +55,7 @@ class Instants:
 
 def instants_of(problem: Problem, segment: Segment, times: Array) -> Instants:
     """Everything that is shown of a motion at `times` (T,) [s]."""
-    states = States(problem.kinematics, *segment.trajectory.states(times, segment.coefficients))
+    states = States.along(problem.kinematics, segment.trajectory, segment.coefficients, times)
     poses = Poses.of(problem.robot, states.q)
     margins = [constraint.margins(states) for constraint in problem.constraints]
     return Instants(

@@ -187,6 +187,22 @@ def test_keys_of_another_kind_are_not_offered(
         ("@gravity: [0, -9.81]", "robot.gravity", "3 values needed"),
         ("@limits: {elbow: {position: [1, 0]}}", "robot.limits.elbow.position", "not below"),
         ("@limits: {elbow: {velocity: 0}}", "robot.limits.elbow.velocity", "greater than 0"),
+        ("@limits: {elbow: {jerk: 0}}", "robot.limits.elbow.jerk", "greater than 0"),
+        ("@limits: {elbow: {effort_by_speed: [[0, 9]]}}", "robot.limits.elbow.effort_by_speed",
+         "at least two points"),
+        ("@limits: {elbow: {effort_by_speed: [[1, 9], [2, 8]]}}",
+         "robot.limits.elbow.effort_by_speed", "the first point must have speed 0"),
+        ("@limits: {elbow: {effort_by_speed: [[0, 9], [0, 8]]}}",
+         "robot.limits.elbow.effort_by_speed", "[0, 8] after [0, 9]: speeds must increase"),
+        ("@limits: {elbow: {effort_by_speed: [[0, 9], [1, 10]]}}",
+         "robot.limits.elbow.effort_by_speed", "torques must not"),
+        ("@limits: {elbow: {effort: 9, effort_by_speed: [[0, 9], [1, 8]]}}",
+         "robot.limits.elbow", "not both"),
+        ("@transmissions: [{joints: [a], motors: [m], matrix: [[1]], limits: "
+         "{m: {effort_by_speed: [[0, 9], [1, 8]]}}}]", "robot.transmissions.0",
+         "limits.m.effort_by_speed: only for a motor that drives one joint alone"),
+        ("@limits_preset: ur5", "robot.limits_preset",
+         "there is no 'ur5'. Did you mean 'ur5e'? There are franka_emika_panda, "),
     ],
 )  # fmt: skip
 def test_a_value_that_is_not_allowed_names_the_path(text: str, path: str, words: str) -> None:

@@ -35,7 +35,7 @@ from tests.robot.random_robots import random_robot
 
 def _all(balance: DiscSpec | PolygonSpec, collision: bool) -> ConstraintsSpec:
     return ConstraintsSpec(
-        joint_limits=JointLimitsSpec(acceleration=8.0),
+        joint_limits=JointLimitsSpec(acceleration=8.0, jerk=60.0),
         torque=TorqueSpec(scale=0.7),
         balance=balance,
         self_collision=SelfCollisionSpec() if collision else None,
@@ -46,7 +46,8 @@ def _all(balance: DiscSpec | PolygonSpec, collision: bool) -> ConstraintsSpec:
 def check_gradients(robot: Robot, constraint: Constraint, seed: int, tolerance: float) -> None:
     kinematics = BatchKinematics(robot)
     q, v, a = robot.draw_states(3, seed)
-    states = States(kinematics, q, v, a)
+    drawn = (q, v, a, 10.0 * a[::-1])
+    states = States(kinematics, *drawn)
     margins = constraint.margins(states)
     assert margins.shape == (3, len(constraint.labels)) == (3, len(constraint.scale))
     columns = np.random.default_rng(seed).permutation(margins.shape[1])[:4]
@@ -57,11 +58,11 @@ def check_gradients(robot: Robot, constraint: Constraint, seed: int, tolerance: 
         for order, part in enumerate(parts):
 
             def margin(x: np.ndarray, t: int = t, c: int = column, order: int = order) -> float:
-                moved = [q[t : t + 1], v[t : t + 1], a[t : t + 1]]
+                moved = [each[t : t + 1] for each in drawn]
                 moved[order] = x[None]
                 return float(constraint.margins(States(kinematics, *moved))[0, c])
 
-            expected = central_differences(margin, (q, v, a)[order][t], 1e-6)
+            expected = central_differences(margin, drawn[order][t], 1e-6)
             found = np.zeros(robot.n) if part is None else part[row]
             size = 1.0 + np.abs(expected).max()
             assert np.abs(found - expected).max() < tolerance * size, constraint.labels[column]
@@ -105,7 +106,8 @@ def with_motors() -> Robot:
         joints=("shoulder", "wrist"),
         motors=("m1", "m2"),
         matrix=((0.5, 0.5), (0.4, -0.6)),
-        limits={"m1": JointLimits(position=(-1.5, 2.0), velocity=1.5, acceleration=5.0, effort=3.0),
+        limits={"m1": JointLimits(position=(-1.5, 2.0), velocity=1.5, acceleration=5.0, jerk=40.0,
+                                  effort=3.0),
                 "m2": JointLimits(effort=4.0)},
     )  # fmt: skip
     return coupled_robot(HAND, transmissions=(wrist,))
@@ -124,7 +126,8 @@ def test_motors_that_drive_several_joints_are_bounded(uncertain: bool) -> None:
         joint_limits=JointLimitsSpec(acceleration=8.0, scale=0.5), torque=TorqueSpec(scale=0.5)
     )
     found = {each.name: each for each in build_constraints(spec, robot, _known(robot, uncertain))}
-    of_motors = ("motor_position", "motor_velocity", "motor_acceleration", "motor_torque")
+    of_motors = ("motor_position", "motor_velocity", "motor_acceleration", "motor_jerk",
+                 "motor_torque")  # fmt: skip
     assert set(of_motors) < set(found)
     for name in of_motors:
         check_gradients(robot, found[name], 1, 1e-5)
@@ -161,8 +164,9 @@ def test_bounds_of_motors_between_instants_hold_at_instants(uncertain: bool) -> 
         least = constraint.least(motion)
         assert least is not None
         for s in (-1.0, -0.3, 0.0, 1.0):
-            at = family.basis(intervals.middles + s * intervals.halves).states(coefficients)
-            margins = constraint.margins(States(BatchKinematics(robot), *at))
+            times = intervals.middles + s * intervals.halves
+            at = States.along(BatchKinematics(robot), family, coefficients, times)
+            margins = constraint.margins(at)
             assert (margins - least).min() > -1e-9
             assert (margins - least).min() < 0.05 * constraint.scale.max()
 
@@ -219,7 +223,8 @@ def test_what_leaves_no_room_is_refused(given: dict, message: str) -> None:
 def test_quick_margins_are_exact_within_reach_and_bounds_beyond(share: float) -> None:
     robot = build_robot(RobotSpec(urdf="example-robot-data:panda"))
     for constraint in build_constraints(_all(DiscSpec(radius=0.3), collision=True), robot):
-        states = States(BatchKinematics(robot), *robot.draw_states(60, 2))
+        q, v, a = robot.draw_states(60, 2)
+        states = States(BatchKinematics(robot), q, v, a, 10.0 * a)
         exact, reach = constraint.margins(states), share * constraint.scale
         quick = constraint.margins_within(states, reach)
         near = exact < reach

@@ -55,7 +55,7 @@ def by_mujoco(constraint: Constraint, plant: WholePlant, phi: Array, states: Sta
     torque, wrench, center = plant.inverse(states.q, states.v, states.a)
     if isinstance(constraint, JointTorque):
         return np.hstack(
-            [constraint._limits[: plant.n] + torque, constraint._limits[: plant.n] - torque]
+            [constraint.scale[: plant.n] + torque, constraint.scale[: plant.n] - torque]
         )
     if isinstance(constraint, Balance):
         return constraint.offsets - center[:, :2] @ constraint.normals.T

@@ -12,6 +12,7 @@ LIMITS = {
     "joint_position": ("constraints.joint_limits.position", "true", "false"),
     "joint_velocity": ("constraints.joint_limits.velocity", "1.2", "false"),
     "joint_acceleration": ("constraints.joint_limits.acceleration", "4.0", "null"),
+    "joint_jerk": ("constraints.joint_limits.jerk", "10.0", "null"),
     "joint_torque": ("constraints.torque", "{scale: 0.25}", "null"),
     "balance": ("constraints.balance", "{kind: disc, radius: 0.02}", "null"),
     "self_collision": ("constraints.self_collision", "{margin: 0.02}", "null"),
@@ -36,6 +37,17 @@ def test_with_it_the_limit_holds_and_without_it_it_is_broken(name: str) -> None:
     assert worst_margins(judge, one_motion(free).coefficients)[name].margin < 0
 
 
+def test_with_a_motor_curve_it_holds_and_without_it_is_broken() -> None:
+    """Torque that falls with speed; at no speed there is as much as without the curve."""
+    judge = _problem("robot.limits={shoulder_pitch: {effort_by_speed: [[0, 72], [2.5, 4]]}}")
+    margins = worst_margins(judge, one_motion(judge).coefficients)
+    assert all(worst.violations == 0 for worst in margins.values())
+    free = one_motion(_problem("robot.limits={shoulder_pitch: {effort: 72}}"))
+    broken = worst_margins(judge, free.coefficients)["joint_torque"]
+    assert broken.margin < 0
+    assert broken.label.startswith("shoulder_pitch")
+
+
 def test_a_limit_of_zero_range_between_samples_is_mended() -> None:
     """A coarse grid misses what happens between its instants; the result still holds."""
     problem = _problem(
@@ -47,4 +59,4 @@ def test_a_limit_of_zero_range_between_samples_is_mended() -> None:
 
 def test_constraints_are_built_in_the_order_of_the_table() -> None:
     names = [constraint.name for constraint in _problem().constraints]
-    assert names == [n for n in LIMITS if n != "balance"]
+    assert names == [n for n in LIMITS if n not in {"joint_jerk", "balance"}]

@@ -252,8 +252,8 @@ def test_without_distances_it_is_the_start_and_nothing_is_near() -> None:
     problem = smoke("constraints.self_collision=null")
     segment = _moving(problem)
     assert closest_time(problem, segment) == 0.0
-    at = segment.trajectory.states(np.array([1.0]), segment.coefficients)
-    states = States(problem.kinematics, *at)
+    at = np.array([1.0])
+    states = States.along(problem.kinematics, segment.trajectory, segment.coefficients, at)
     margins = [constraint.margins(states) for constraint in problem.constraints]
     assert nearest_bodies(problem, Poses.of(problem.robot, states.q), margins) is None
 
@@ -268,7 +268,7 @@ def test_of_several_distances_the_least_counts() -> None:
         for m in kept
     ]
     trajectory = SimpleNamespace(
-        duration=1.0, states=lambda times, coefficients: (times[:, None],) * 3
+        duration=1.0, orders=lambda times, coefficients: (times[:, None],) * 4
     )
     problem: Any = SimpleNamespace(kinematics=None, constraints=constraints)
     segment: Any = SimpleNamespace(trajectory=trajectory, coefficients=None)

@@ -234,17 +234,19 @@ def test_a_judge_decides_and_the_motion_swells_where_no_polynomial_will_do() -> 
         program(problem, motion, posture, judge=lambda *_: "a rule of this test")
 
 
-def test_the_quickest_polynomial_is_near_a_bound() -> None:
-    problem = _problem("constraints.torque=null")
+@pytest.mark.parametrize("jerk", [1e6, 5.0])
+def test_the_quickest_polynomial_is_near_a_bound(jerk: float) -> None:
+    problem = _problem("constraints.torque=null", f"constraints.joint_limits.jerk={jerk}")
     start = problem.robot.posture
     end = start + np.array([1.0, 0.2, -0.3, 0.0, 0.0])
     piece = joined_states(
         problem, judge_of(problem), "entry", State.resting(start), State.resting(end)
     )
     times = np.linspace(0.0, piece.trajectory.duration, 4001)
-    _, v, a = piece.trajectory.states(times, piece.coefficients)
+    _, v, a, j = piece.trajectory.orders(times, piece.coefficients)
     used = max(np.abs(v / problem.robot.limits.velocity).max(), np.abs(a).max() / 10.0)
-    assert 1 / 1.15**2 < used <= 1.0
+    used = max(used, np.abs(j).max() / jerk)
+    assert 1 / 1.15**3 < used <= 1.0
 
 
 def test_what_does_not_close_is_not_repeated() -> None:

@@ -170,7 +170,7 @@ def test_motions_pass_where_a_constraint_bends_along_the_way() -> None:
 
 
 def test_chosen_rows_match_differences() -> None:
-    task = task_of()
+    task = task_of("constraints.joint_limits.jerk=50")
     x = random_start(task, clear_posture(task, 1), (1, 1, 0))
     direction = np.random.default_rng(3).normal(size=task.size)
     states = task.states(x)

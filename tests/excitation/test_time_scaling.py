@@ -26,14 +26,11 @@ def test_the_share_is_kept_and_reached(seed: int, share: float, which: int) -> N
     rng = np.random.default_rng(seed)
     family = FAMILIES[which]
     alpha = rng.normal(size=(family.n_coefficients, 3))
-    limits = PaceLimits(rng.uniform(0.3, 5.0, 3), rng.uniform(0.3, 20.0, 3))
+    limits = PaceLimits(rng.uniform(0.3, 1.0, (3, 3)) * np.array([[5.0], [20.0], [80.0]]))
     pace = slowing(limits, family, alpha, share)
     slow = family.slowed(pace)
-    _, v, a = slow.states(np.linspace(0.0, slow.duration, 20_001), alpha)
-    used = max(
-        (np.abs(v).max(axis=0) / limits.velocity).max(),
-        (np.abs(a).max(axis=0) / limits.acceleration).max(),
-    )
+    rates = slow.orders(np.linspace(0.0, slow.duration, 20_001), alpha)[1:]
+    used = (np.abs(rates).max(axis=1) / limits.largest).max()
     assert 0 < pace <= 1
     assert used <= share * (1 + 1e-9)
     if pace < 1:
@@ -42,28 +39,29 @@ def test_the_share_is_kept_and_reached(seed: int, share: float, which: int) -> N
 
 def test_a_motion_that_is_slow_enough_is_not_sped_up() -> None:
     family = FourierTrajectory(2, 0.1)
-    limits = PaceLimits(np.full(1, 100.0), np.full(1, np.inf))
+    limits = PaceLimits(np.array([[100.0], [np.inf], [np.inf]]))
     assert slowing(limits, family, np.ones((5, 1)), 1.0) == 1.0
     assert slowing(limits, family, np.zeros((5, 1)), 0.5) == 1.0
 
 
 def test_limits_are_those_of_the_constraints() -> None:
-    problem = smoke("constraints.joint_limits={acceleration: 7, velocity: 0.9}")
+    problem = smoke("constraints.joint_limits={acceleration: 7, velocity: 0.9, jerk: 50}")
     robot = problem.robot
-    limits = PaceLimits.of(problem.constraints, robot.n)
-    assert limits.velocity == pytest.approx(np.minimum(robot.limits.velocity, 0.9))
-    assert limits.acceleration == pytest.approx(np.full(robot.n, 7.0))
-    assert np.isinf(PaceLimits.of((), 2).velocity).all()
+    limits = PaceLimits.of(problem.constraints, robot.n).largest
+    assert limits[0] == pytest.approx(np.minimum(robot.limits.velocity, 0.9))
+    assert limits[1] == pytest.approx(np.full(robot.n, 7.0))
+    assert limits[2] == pytest.approx(np.full(robot.n, 50.0))
+    assert np.isinf(PaceLimits.of((), 2).largest).all()
 
 
 @pytest.mark.parametrize(
     ("share", "limit", "words"),
     [
         *((share, 1.0, r"share of the limits from 0\.001 to 1") for share in (0.0, 1.01, np.nan)),
-        (0.5, np.inf, "no limits of speed or acceleration"),
+        (0.5, np.inf, "no limits of speed, acceleration or jerk"),
     ],
 )
 def test_what_cannot_be_kept(share: float, limit: float, words: str) -> None:
-    limits = PaceLimits(np.full(1, limit), np.full(1, limit))
+    limits = PaceLimits(np.full((3, 1), limit))
     with pytest.raises(ConfigError, match=words):
         slowing(limits, FourierTrajectory(2, 1.0), np.ones((5, 1)), share)

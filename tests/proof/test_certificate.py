@@ -23,11 +23,12 @@ CONFIG = """
 robot:
   urdf: smoke_arm.urdf
   posture: {shoulder_pitch: 0.9, elbow: 1.0, slide: 0.07}
+  limits: {elbow: {effort_by_speed: [[0, 20], [0.3, 18], [0.8, 9], [2, 6]]}}
   payload: {link: tool, mass: 0.5, center: [0, 0, 0.1], start: [0, 0, 0.08], end: [0, 0, 0.14],
             radius: 0.03}
 trajectory: {family: fourier, harmonics: 3, base_frequency: 1.2}
 constraints:
-  joint_limits: {acceleration: 10.0}
+  joint_limits: {acceleration: 10.0, jerk: 12.0}
   torque: {scale: 0.6}
   balance: {kind: polygon, vertices: [[-0.14, -0.14], [0.14, -0.14], [0.14, 0.14], [-0.14, 0.14]]}
   contact:
@@ -46,8 +47,8 @@ constraints:
 UNCERTAIN = CONFIG + "uncertainty: {mass: 0.05, center_of_mass: 0.005, inertia: 0.1}\n"
 FAMILIES = {"fourier": FourierTrajectory(3, 1.2), "bspline": BSplineTrajectory(5.0, 12, 5)}
 KINDS = [
-    "joint_position", "joint_velocity", "joint_acceleration", "joint_torque", "balance", "zmp",
-    "contact", "self_collision", "surroundings", "keep_out",
+    "joint_position", "joint_velocity", "joint_acceleration", "joint_jerk", "joint_torque",
+    "balance", "zmp", "contact", "self_collision", "surroundings", "keep_out",
 ]  # fmt: skip
 
 

@@ -120,9 +120,12 @@ def test_states_lie_within(family: Trajectory, width: float) -> None:
     found = enclosed_states(family, coefficients, intervals)
     for s in np.linspace(-1, 1, 17):
         times = intervals.middles + s * intervals.halves
-        actual = family.basis(times).states(coefficients)
-        for enclosed, value in zip((found.q, found.v, found.a), actual, strict=True):
-            assert np.all(np.abs(value - enclosed.at(s)) <= enclosed.radius + 1e-9)
+        # At a knot the jerk of a cubic spline jumps to that of what follows.
+        last = 4 if abs(s) < 1 else 3
+        for order, value in enumerate(family.orders(times, coefficients)[:last]):
+            enclosed = found.order(order)
+            close = 1e-9 * max(1.0, float(np.abs(value).max()))
+            assert np.all(np.abs(value - enclosed.at(s)) <= enclosed.radius + close)
     ends = np.sort(np.concatenate([intervals.middles - intervals.halves, [family.duration]]))
     assert ends[0] == pytest.approx(0.0, abs=1e-12)
     assert np.all(intervals.halves <= width / 2 + 1e-12)

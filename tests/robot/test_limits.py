@@ -331,13 +331,14 @@ def test_followers_narrow_the_limits_of_their_driver(tmp_path: Path) -> None:
         for low, high, speed in ((-0.9, 0.9, 2), (-0.5, 0.3, 0.9))
     )
     tail = urdf_of(CLAW).split('name="right_tip"')[1]
-    given = {"left_tip": JointLimits(acceleration=5.0)}
+    given = {"left_tip": JointLimits(acceleration=5.0, jerk=60.0)}
     limits = claw(tmp_path, tail, tail.replace(limit, narrow, 1), limits=given).limits
     # right_tip stands at 0.9 q + 0.05, at most 0.3
     assert limits.upper[2] == pytest.approx((0.3 - 0.05) / 0.9)
     assert limits.lower[2] == 0.0
     assert limits.velocity[2] == pytest.approx(0.9 / 0.9)
     assert limits.acceleration[2] == 5.0
+    assert limits.jerk[2] == 60.0
     assert limits.effort[2] == 30.0
     robot = claw(tmp_path, 'lower="-0.9" upper="0.9" velocity="2"', 'velocity="0"')
     assert robot.limits.upper[2] == 0.8, "followers without limits do not narrow"

@@ -21,12 +21,13 @@ FAMILIES: list[Trajectory] = [
 
 
 @pytest.mark.parametrize("family", FAMILIES, ids=repr)
-def test_velocity_and_acceleration_are_derivatives_of_position(family: Trajectory) -> None:
+def test_velocity_acceleration_and_jerk_are_derivatives_of_position(family: Trajectory) -> None:
     times = np.linspace(0.03, 0.97, 31) * family.duration
     h = 1e-4
     after, at, before = (family.basis(times + shift) for shift in (h, 0.0, -h))
     assert relative_error(at.velocity, (after.position - before.position) / (2 * h)) < 1e-6
     assert relative_error(at.acceleration, (after.velocity - before.velocity) / (2 * h)) < 1e-6
+    assert relative_error(at.jerk, (after.acceleration - before.acceleration) / (2 * h)) < 1e-5
 
 
 @pytest.mark.parametrize("family", FAMILIES, ids=repr)

@@ -20,7 +20,7 @@ def instants(problem: Problem, segment: Segment) -> Instants:
 
 @pytest.fixture(scope="module")
 def states(problem: Problem, segment: Segment) -> States:
-    return States(problem.kinematics, *segment.trajectory.states(TIMES, segment.coefficients))
+    return States.along(problem.kinematics, segment.trajectory, segment.coefficients, TIMES)
 
 
 def test_the_nearest_pair_is_the_nearest(

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from excite_cli.constraints.base import Array
+from excite_cli.constraints.base import Array, part_of
 from excite_cli.constraints.joint_columns import JointColumns
 from excite_cli.criteria.base import Criterion
 from excite_cli.dynamics.forward_kinematics import States
@@ -249,7 +249,7 @@ class _Run:
     def longest_step(self, point: _Point, direction: Array) -> float:
         """Share of the step that keeps every linear bound, at most 1."""
         task, step = self.task, 1.0
-        change = task.problem.constraint_basis.states(task.change(direction))
+        change = task.problem.constraint_basis.orders(task.change(direction))
         for constraint, value in zip(task.problem.constraints, point.values, strict=True):
             columns = constraint.linear
             if columns is None:
@@ -281,9 +281,7 @@ class _Run:
             first, second = weight * _first(counted, reach), weight * _second(counted, reach)
             if columns is not None:
                 pull, bend = _per_joint(columns, constraint.scale, (first, second), task.n)
-                parts: list[Array | None] = [None, None, None]
-                parts[columns.quantity] = pull
-                grid.add_gradient(gradient, parts)
+                grid.add_gradient(gradient, part_of(columns.quantity, pull))
                 grid.add_joint_curvature(hessian, columns.quantity, bend)
                 continue
             near = value < reach
