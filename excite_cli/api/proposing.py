@@ -95,9 +95,9 @@ def propose(
     or `robot_descriptions:<name>`; `joints` those to move, none for a choice of ours;
     `package_dirs` and `xacro_args` as under `robot` in a config; `srdf` a file with postures and
     pairs not to check, else one beside the URDF is taken; `overrides` (`key.path=value`) stand in
-    place of what is chosen; `floor` (a height [m], or "none"), `boxes`, `walls` and `keep_out` are as
-    the options of the command, and without `floor` a robot that stands gets one under what does not
-    move; `allow` is asked whether the robot's files may read a folder outside
+    place of what is chosen; `floor` (a height [m], or "none"), `boxes`, `walls` and `keep_out` are
+    those of the command's options, and without `floor` a robot that stands gets one under what does
+    not move; `allow` is asked whether the robot's files may read a folder outside
     their own (`package_dirs` answers beforehand). The `text` of what is returned is the YAML file,
     `notes` say what was chosen and why.
 

@@ -1,4 +1,4 @@
-"""The cell that a robot stands in, as one says it at a shell: floor, boxes, walls, joint regions."""
+"""The cell that a robot stands in, as given at a shell: floor, boxes, walls, joint regions."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -59,9 +59,7 @@ def put_cell(cell: Cell, tree: Tree) -> None:
         parsed_spec(tree, "--floor, --box, --wall, --keep-out")
 
 
-def _by_name(
-    option: str, texts: Sequence[str], read: Callable[[str, str], Any]
-) -> dict[str, Any]:
+def _by_name(option: str, texts: Sequence[str], read: Callable[[str, str], Any]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for text in texts:
         name, _, words = text.partition("=")

@@ -15,14 +15,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.geometry.link_meshes import Poses
-from excite_cli.geometry.link_shapes import collision_model, placed_shapes
+from excite_cli.geometry.link_meshes import Poses, link_meshes
 from excite_cli.robot.carried_bodies import MovedBodies
 from excite_cli.robot.model import Array, Robot
 
 # Postures of the mean: as many as `geometry/obstacle_pairs.py` asks what meets what.
 _POSTURES, _SEED = 300, 0
-_DIGITS = 3  # [m] a floor is level to a millimetre at best
+_LEVEL, _DIGITS = 1e-3, 3  # [m] a floor is level to a millimetre at best
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,8 @@ class Floor:
 def floor_below(robot: Robot) -> Floor:
     """The lowest point of what does not move, at the robot's posture; 0 if it has no shapes.
 
-    None for a robot that hangs, or leans out from a wall.
+    None for a robot that hangs or leans out from a wall, where a body never rises to the plane, and
+    where none rises above it (a turning base may stand on the plane all the time).
 
     Raises
     ------
@@ -44,31 +44,39 @@ def floor_below(robot: Robot) -> Floor:
         A mesh cannot be used.
     """
     moved, here = MovedBodies(robot), Poses.of(robot, robot.posture[None])
-    points, links, lowest = [np.zeros((0, 3))], [], []
-    for item, link, local in placed_shapes(robot, collision_model(robot)):
-        if not len(moved.moving(int(item.parentJoint))):
-            points.append(here.points(int(item.parentJoint), local)[0])
-            links.append(link)
-            lowest.append(float(points[-1][:, 2].min()))
-    still = np.vstack(points)
-    # Without shapes the robot is bolted down where its base frame is.
-    middle = (still.min(axis=0) + still.max(axis=0)) / 2 if len(still) else np.zeros(3)
-    if not _stands(robot, moved, middle):
-        return Floor(
-            None,
-            "what moves does not rise from what carries it: the robot hangs or is bolted to a "
-            "wall. --floor HEIGHT gives one",
-        )
+    poses = Poses.of(robot, robot.draw_states(_POSTURES, _SEED)[0])
+    carried: dict[int, list[Array]] = {}
+    still: dict[str, Array] = {}
+    for mesh in link_meshes(robot):
+        if len(moved.moving(mesh.joint)):
+            carried.setdefault(mesh.joint, []).append(mesh.hull)
+        else:
+            still[mesh.link] = here.points(mesh.joint, mesh.hull)[0]
+    # Without shapes the robot is bolted down where the world has its origin.
+    points = np.vstack([*still.values()]) if still else np.zeros((1, 3))
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    if not _stands(robot, moved, poses, middle):
+        words = "what moves does not rise from what carries it, so the robot hangs or is bolted to"
+        return Floor(None, f"{words} a wall; --floor HEIGHT gives one")
     height, where = 0.0, "the plane of the world's origin, since what does not move has no shapes"
-    if links:
-        height = round(min(lowest), _DIGITS) + 0.0  # no -0.0
-        where = f"the lowest point of what does not move ({links[int(np.argmin(lowest))]})"
+    if still:
+        height = round(float(points[:, 2].min()), _DIGITS) + 0.0  # no -0.0
+        lowest = min(still, key=lambda link: float(still[link][:, 2].min()))
+        where = f"the lowest point of what does not move ({lowest})"
+    rises = {  # by joint, how far its shapes can all be above the plane [m]
+        joint: float(poses.points(joint, np.vstack(hulls))[:, :, 2].min(axis=1).max()) - height
+        for joint, hulls in carried.items()
+    }
+    if min(rises.values(), default=1.0) < -_LEVEL or max(rises.values(), default=1.0) < _LEVEL:
+        never = robot.model.names[min(rises, key=rises.__getitem__)]
+        words = f"what {never} carries never rises above {where}"
+        return Floor(None, f"{words}; --floor HEIGHT gives one")
     return Floor(height, f"{where}; --floor HEIGHT for another, --floor none for none")
 
 
-def _stands(robot: Robot, moved: MovedBodies, middle: Array) -> bool:
+def _stands(robot: Robot, moved: MovedBodies, poses: Poses, middle: Array) -> bool:
     """Whether every limb rises from `middle` (3,) [m], and all together more than they lean."""
-    model, poses = robot.model, Poses.of(robot, robot.draw_states(_POSTURES, _SEED)[0])
+    model = robot.model
     first: dict[int, int] = {}  # of every joint that moves, the first one of its limb
     moments: dict[int, Array] = {}
     masses: dict[int, float] = {}

@@ -23,7 +23,7 @@ from excite_cli.proposal.feasibility import (
     first_posture,
     settle,
 )
-from excite_cli.proposal.floor import floor_below
+from excite_cli.proposal.floor import Floor, floor_below
 from excite_cli.proposal.joints import JointChoice, choose_joints
 from excite_cli.proposal.shapes import Shapes, choose_shapes
 from excite_cli.proposal.timing import Pace, choose_pace
@@ -75,7 +75,7 @@ class Request:
     srdf: Path | None = None
     overrides: tuple[str, ...] = ()
     allow: Allow = allow_nothing
-    cell: Cell = Cell()
+    cell: Cell = field(default_factory=Cell)
 
 
 @dataclass(frozen=True, repr=False)
@@ -254,10 +254,10 @@ def _on_a_floor(
     said = request.cell.floor is not None or around is None or "floor" in around
     if said or request.base != "fixed":
         return ()
-    if not shapes.any:
-        return ("no floor: no link has shapes that could be kept above it",)
     spec = parsed_spec(tree, "the proposed config")
-    floor = floor_below(with_shapes(build_robot(spec.robot, request.folder), spec.constraints))
+    floor = Floor(None, "no shapes are looked at that could be kept above it")
+    if shapes.any and spec.constraints.self_collision is not None:
+        floor = floor_below(with_shapes(build_robot(spec.robot, request.folder), spec.constraints))
     if floor.height is None:
         comments["constraints",] = f"no floor: {floor.words}"
         return (f"no floor: {floor.words}",)
