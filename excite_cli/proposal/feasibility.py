@@ -110,6 +110,7 @@ def settle(tree: Tree, comments: Comments, folder: Path) -> FeasibleProblem:
     """
     comments = dict(comments)
     tries, digits, moved = _FEW_TRIES, _DIGITS, False
+    around: list[tuple[str, str]] = []
     for _ in range(_ROUNDS):
         problem = build_problem(parsed_spec(tree, "the proposed config"), folder)
         task = MotionTask(problem)
@@ -137,6 +138,8 @@ def settle(tree: Tree, comments: Comments, folder: Path) -> FeasibleProblem:
             comments["robot", "posture"] += ", moved until capsules, limits and torques have room"
         robot = replace(problem.robot, posture=posture)
         return FeasibleProblem(tree, comments, replace(problem, robot=robot), start)
+    if around:
+        raise _crowded(around, tries)
     raise NoAdmissibleMotionError("No clear posture was found, although limits were loosened.")
 
 
