@@ -35,8 +35,7 @@ class Floor:
 def floor_below(robot: Robot) -> Floor:
     """The lowest point of what does not move, at the robot's posture; 0 if it has no shapes.
 
-    None for a robot that hangs or leans out from a wall, where a body never rises to the plane, and
-    where none rises above it (a turning base may stand on the plane all the time).
+    None for a robot that hangs or leans out from a wall, and where nothing rises above the plane.
 
     Raises
     ------
@@ -63,14 +62,13 @@ def floor_below(robot: Robot) -> Floor:
         height = round(float(points[:, 2].min()), _DIGITS) + 0.0  # no -0.0
         lowest = min(still, key=lambda link: float(still[link][:, 2].min()))
         where = f"the lowest point of what does not move ({lowest})"
-    rises = {  # by joint, how far its shapes can all be above the plane [m]
-        joint: float(poses.points(joint, np.vstack(hulls))[:, :, 2].min(axis=1).max()) - height
+    rises = [  # how far the shapes on a joint can all be above the plane [m]
+        float(poses.points(joint, np.vstack(hulls))[:, :, 2].min(axis=1).max()) - height
         for joint, hulls in carried.items()
-    }
-    if min(rises.values(), default=1.0) < -_LEVEL or max(rises.values(), default=1.0) < _LEVEL:
-        never = robot.model.names[min(rises, key=rises.__getitem__)]
-        words = f"what {never} carries never rises above {where}"
-        return Floor(None, f"{words}; --floor HEIGHT gives one")
+    ]
+    # Shapes of a first link may reach below it all the time; those of all that moves may not.
+    if max(rises, default=1.0) < _LEVEL:
+        return Floor(None, f"nothing that moves rises above {where}; --floor HEIGHT gives one")
     return Floor(height, f"{where}; --floor HEIGHT for another, --floor none for none")
 
 
