@@ -12,6 +12,7 @@ from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.catalogue import build_constraints
 from excite_cli.errors import ExciteError, FileError
 from excite_cli.excitation.motion import Doubt
+from excite_cli.excitation.not_modelled import not_in_config
 from excite_cli.excitation.problem import build_problem
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.time_scaling import PaceLimits, slowed_chain
@@ -46,7 +47,8 @@ class ChainRequest:
 class ExportedChain:
     """What is written: `pace` is the share of its own pace at which the motion goes.
 
-    `doubt`: why it does not count as proved, although its file says so.
+    `doubt`: why it does not count as proved, although its file says so. `not_modelled`: what its
+    verdict does not speak of; empty of a file that has no verdict.
     """
 
     name: str
@@ -54,6 +56,7 @@ class ExportedChain:
     chain: Chain
     pace: float
     doubt: Doubt = Doubt.NONE
+    not_modelled: tuple[str, ...] = ()
 
 
 def chains_of(file: Path, wanted: ChainRequest, tell: Tell) -> list[ExportedChain]:
@@ -82,10 +85,18 @@ def chains_of(file: Path, wanted: ChainRequest, tell: Tell) -> list[ExportedChai
         limits = PaceLimits.of(constraints, len(joints))
         slowed = [slowed_chain(limits, chain, wanted.slow) for chain in chains]
         chains, paces = [chain for chain, _ in slowed], [pace for _, pace in slowed]
+    missing = _not_modelled(file, result)
     return [
-        ExportedChain(segment.name, joints, chain, pace, doubt)
+        ExportedChain(segment.name, joints, chain, pace, doubt, missing)
         for segment, chain, pace, doubt in zip(motions, chains, paces, doubts, strict=True)
     ]
+
+
+def _not_modelled(file: Path, result: Result) -> tuple[str, ...]:
+    """What the config of a result knows nothing of; its robot need not be here."""
+    spec = parse_spec(result.config, f"the config stored in {file}")
+    own = spec.constraints.self_collision
+    return not_in_config(spec, () if own is None else own.without_shapes)
 
 
 def _own_motion(file: Path, wanted: ChainRequest) -> tuple[tuple[str, ...], Segment]:

@@ -26,6 +26,7 @@ from excite_cli.store.diagnosis_file import is_diagnosis
 from excite_cli.store.fit_file import is_fit, read_fit
 from excite_cli.store.model_file import is_text, read_model
 from excite_cli.store.thresholds_file import read_thresholds
+from excite_cli.summary.pairs import not_modelled_in_words
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,8 @@ class ExportedMotion:
 class Exported:
     """The files that were written in `format`; of motions also what is in them.
 
-    `rate` [Hz], and `slow`: the share of the limits that was requested.
+    `rate` [Hz], and `slow`: the share of the limits that was requested. `not_modelled`: what the
+    verdict on the motions does not speak of.
     """
 
     format: str
@@ -57,6 +59,7 @@ class Exported:
     motions: tuple[ExportedMotion, ...] = ()
     rate: float = 0.0
     slow: float | None = None
+    not_modelled: tuple[str, ...] = ()
 
 
 @checked()
@@ -141,7 +144,7 @@ def export_file(
             "is played"
         )
         tell(Note(Level.INFO, text))
-    return Exported(format, tuple(paths), motions, rate, slow)
+    return Exported(format, tuple(paths), motions, rate, slow, chains[0].not_modelled)
 
 
 def export_answer(found: Exported) -> Answer:
@@ -167,7 +170,14 @@ def export_answer(found: Exported) -> Answer:
         }
         for each in found.motions
     ]
-    return Answer(lines, {"format": found.format, "rate": found.rate, "motions": motions})
+    data = {
+        "format": found.format,
+        "rate": found.rate,
+        "motions": motions,
+        "not_modelled": list(found.not_modelled),
+    }
+    said = (not_modelled_in_words(found.not_modelled),) if found.not_modelled else ()
+    return Answer((*lines, *said), data)
 
 
 def _written(

@@ -10,6 +10,7 @@ from excite_cli.api.outputs import held
 from excite_cli.atomic import write_text_atomically
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import ConfigError, RobotError, nearest
+from excite_cli.proposal.cell import Cell
 from excite_cli.proposal.joints import choose_joints, limbs
 from excite_cli.proposal.propose import Proposal, Request
 from excite_cli.proposal.propose import propose as propose_config
@@ -82,6 +83,10 @@ def propose(
     xacro_args: Mapping[str, str] | None = None,
     srdf: str | Path | None = None,
     overrides: Sequence[str] = (),
+    floor: str | float | None = None,
+    boxes: Sequence[str] = (),
+    walls: Sequence[str] = (),
+    keep_out: Sequence[str] = (),
     allow: Allow = allow_nothing,
 ) -> Proposal:
     """A config for a robot of which nothing but the URDF is known: `excite init`.
@@ -90,7 +95,9 @@ def propose(
     or `robot_descriptions:<name>`; `joints` those to move, none for a choice of ours;
     `package_dirs` and `xacro_args` as under `robot` in a config; `srdf` a file with postures and
     pairs not to check, else one beside the URDF is taken; `overrides` (`key.path=value`) stand in
-    place of what is chosen; `allow` is asked whether the robot's files may read a folder outside
+    place of what is chosen; `floor` (a height [m], or "none"), `boxes`, `walls` and `keep_out` are
+    those of the command's options, and without `floor` a robot that stands gets one under what does
+    not move; `allow` is asked whether the robot's files may read a folder outside
     their own (`package_dirs` answers beforehand). The `text` of what is returned is the YAML file,
     `notes` say what was chosen and why.
 
@@ -119,6 +126,7 @@ def propose(
             None if srdf is None else Path(srdf),
             tuple(overrides),
             allow,
+            Cell(floor, tuple(boxes), tuple(walls), tuple(keep_out)),
         )
     )
 
@@ -134,6 +142,10 @@ def save_proposal(
     xacro_args: Mapping[str, str] | None = None,
     srdf: str | Path | None = None,
     overrides: Sequence[str] = (),
+    floor: str | float | None = None,
+    boxes: Sequence[str] = (),
+    walls: Sequence[str] = (),
+    keep_out: Sequence[str] = (),
     allow: Allow = allow_nothing,
     overwrite: bool = False,
     tell: Tell = log_note,
@@ -173,6 +185,10 @@ def save_proposal(
             xacro_args=xacro_args,
             srdf=srdf,
             overrides=overrides,
+            floor=floor,
+            boxes=boxes,
+            walls=walls,
+            keep_out=keep_out,
             allow=lambda each: each.folder in allowed,
         )
         write_text_atomically(path, found.text)

@@ -61,6 +61,39 @@ def init(
             help="Read packages and meshes found outside the robot's folder, without asking.",
         ),
     ] = False,
+    floor: Annotated[
+        str | None,
+        typer.Option(
+            "--floor",
+            metavar="HEIGHT|none",
+            help="Height of the floor in the world [m]; none: the robot hangs. Default, for a "
+            "fixed base: the lowest point of what does not move.",
+        ),
+    ] = None,
+    boxes: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--box",
+            metavar="NAME=LENGTHS@CENTRE",
+            help="A table, a cabinet [m] (may be repeated): table=1.2,0.8,0.7@0.9,0,0.35.",
+        ),
+    ] = None,
+    walls: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--wall",
+            metavar="NAME=POINT:NORMAL",
+            help="A wall, its normal towards the robot (may be repeated): back=-0.5,0,0:1,0,0.",
+        ),
+    ] = None,
+    keep_out: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--keep-out",
+            metavar="JOINT=FROM,TO",
+            help="Positions of a joint to stay out of [rad or m] (may be repeated).",
+        ),
+    ] = None,
     overrides: options.Set = None,
     overwrite: options.Overwrite = False,
     as_json: options.Json = False,
@@ -72,7 +105,8 @@ def init(
 
     Joints to move are chosen (no fingers, no wheels), with sensible limits where the URDF has none,
     a posture clear of limits and self-collision, and a pace that suits the slowest joint. Without
-    --robot or --urdf, it asks at the terminal.
+    --robot or --urdf, it asks at the terminal. A robot that stands is kept above a floor under what
+    does not move; --floor, --box, --wall and --keep-out say what else is there.
 
     A robot's files read their own folder (or ROS package) and those of --package-dirs. Files
     that they need from elsewhere are searched for, and read after confirmation (or with
@@ -83,6 +117,8 @@ def init(
     Example:  excite init --urdf arm.urdf.xacro --xacro-arg gripper=none
 
     Example:  excite init --robot ur10 --set sequence.motions=5
+
+    Example:  excite init --robot ur10 --floor -0.8 --box table=1.2,0.8,0.7@0.9,0,-0.45
     """
     from excite_cli.api.proposing import EXAMPLE_PREFIX, is_named, limbs_of, save_proposal
     from excite_cli.api.working import single_threaded
@@ -118,6 +154,10 @@ def init(
             xacro_args=arguments,
             srdf=srdf,
             overrides=overrides or (),
+            floor=floor,
+            boxes=boxes or (),
+            walls=walls or (),
+            keep_out=keep_out or (),
             allow=allow,
             overwrite=overwrite,
             tell=terminal.tell,

@@ -1,5 +1,8 @@
 """What no constraint of a problem knows of: what a verdict on its motions does not speak of."""
 
+from collections.abc import Sequence
+
+from excite_cli.config.spec import Spec
 from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.excitation.problem import Problem
 from excite_cli.robot.model import links_by_joint
@@ -9,15 +12,23 @@ _LISTED = 4
 
 def not_modelled(problem: Problem) -> tuple[str, ...]:
     """Things that a motion of `problem` may hit, by name, the most obvious first."""
-    asked, found = problem.spec.constraints, []
+    return not_in_config(
+        problem.spec, [*links_without_shapes(problem), *bodies_without_shapes(problem)]
+    )
+
+
+def not_in_config(spec: Spec, bare: Sequence[str]) -> tuple[str, ...]:
+    """The same of a config alone; `bare`: its links or joints that have no shapes."""
+    asked, found = spec.constraints, []
     around = asked.surroundings
     if around is None:
         found.append("the floor and all else around the robot (constraints.surroundings)")
-    elif around.floor is None and problem.spec.robot.base == "fixed":
+    elif around.floor is None and spec.robot.base == "fixed":
         found.append("the floor (constraints.surroundings.floor)")
+    elif not around.boxes and not around.walls:
+        found.append("all around the robot but the floor (constraints.surroundings)")
     if asked.self_collision is None:
         found.append("the robot's own links (constraints.self_collision)")
-    bare = [*links_without_shapes(problem), *bodies_without_shapes(problem)]
     if bare:
         more = f" and {len(bare) - _LISTED} more" if len(bare) > _LISTED else ""
         found.append(f"bodies without shapes: {', '.join(bare[:_LISTED])}{more}")

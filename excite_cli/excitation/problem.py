@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from excite_cli.config.constraints_spec import ConstraintsSpec
 from excite_cli.config.spec import Spec
 from excite_cli.config.trajectory_spec import GridSpec, SamplingSpec
 from excite_cli.constraints.base import Array, Constraint
@@ -216,11 +217,7 @@ def build_problem(
     ConfigError, RobotError
         What the spec asks for does not fit the robot.
     """
-    apart = spec.constraints.self_collision
-    robot = build_robot(spec.robot, relative_to)
-    if apart is not None:
-        described = without_unusable(robot.description, apart.without_shapes)
-        robot = replace(robot, description=described, visual_shapes=apart.shapes == "visual")
+    robot = with_shapes(build_robot(spec.robot, relative_to), spec.constraints)
     spec = _with_freedom(spec, robot)
     trajectory = build_trajectory(spec.trajectory)
     spec = with_sampling(spec, trajectory)
@@ -281,6 +278,15 @@ def build_problem(
         folder=(relative_to or Path()).resolve(),
     )
     return on_fine_grid(problem) if extension.fine else problem
+
+
+def with_shapes(robot: Robot, spec: ConstraintsSpec) -> Robot:
+    """The robot with the shapes that its constraints look at."""
+    apart = spec.self_collision
+    if apart is None:
+        return robot
+    described = without_unusable(robot.description, apart.without_shapes)
+    return replace(robot, description=described, visual_shapes=apart.shapes == "visual")
 
 
 def _with_freedom(spec: Spec, robot: Robot) -> Spec:

@@ -98,8 +98,10 @@ def _unit_by_joint(task: MotionTask, x: Array) -> Array:
     return np.asarray((by_joint / length[:, None]).ravel())
 
 
-def clear_posture(task: MotionTask, seed: int, tries: int = _TRIES) -> Start:
+def clear_posture(task: MotionTask, seed: int, tries: int = _TRIES, given: bool = True) -> Start:
     """A posture at which standing still keeps every residual clear, sought from `tries` guesses.
+
+    `given`: somebody gave the posture of the config, and is to correct one that no robot can have.
 
     Raises
     ------
@@ -108,7 +110,8 @@ def clear_posture(task: MotionTask, seed: int, tries: int = _TRIES) -> Start:
         that prevents it.
     """
     configured = task.problem.robot.posture
-    refuse_impossible(task, configured, "robot.posture")
+    if given:
+        refuse_impossible(task, configured, "robot.posture")
     if _standing(task, configured).min() > _CLEAR_POSTURE:
         return _standing_at(task, configured, True)
     rng = np.random.default_rng((seed, 7))

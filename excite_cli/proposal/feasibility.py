@@ -19,6 +19,7 @@ from excite_cli.config.load_spec import parsed_spec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.joint_columns import Quantity
 from excite_cli.constraints.mesh_clearance import MeshClearance
+from excite_cli.constraints.obstacle_clearance import Surroundings
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.start import (
@@ -33,6 +34,7 @@ from excite_cli.excitation.task import MotionTask
 from excite_cli.geometry.collision_pairs import CollisionPairs
 from excite_cli.geometry.mesh_distances import MeshDistances
 from excite_cli.geometry.mesh_pairs import joined_links
+from excite_cli.geometry.obstacles import FLOOR
 from excite_cli.geometry.pair_tables import near_at_posture
 from excite_cli.proposal.assumed_limits import JointPlan
 from excite_cli.robot.carried_bodies import MovedBodies
@@ -85,6 +87,7 @@ _SELDOM_APART = 0.8
 _ROUNDS = 10
 _FEW_TRIES, _MANY_TRIES = 6, 40
 _DIGITS, _FINE_DIGITS = 4, 8
+_LISTED = 4
 
 
 @dataclass(frozen=True)
@@ -107,15 +110,20 @@ def settle(tree: Tree, comments: Comments, folder: Path) -> FeasibleProblem:
     """
     comments = dict(comments)
     tries, digits, moved = _FEW_TRIES, _DIGITS, False
+    around: list[tuple[str, str]] = []
     for _ in range(_ROUNDS):
         problem = build_problem(parsed_spec(tree, "the proposed config"), folder)
         task = MotionTask(problem)
         try:
-            start = clear_posture(task, problem.spec.seed, tries)
+            start = clear_posture(task, problem.spec.seed, tries, given=False)
         except NoClearPostureError as error:
-            if not _yielded(tree, comments, task, error.posture):
+            around = _around(task, error.posture)
+            # What stands around does not yield: a better posture is sought before anything does.
+            if (around and tries < _MANY_TRIES) or not _yielded(
+                tree, comments, task, error.posture
+            ):
                 if tries == _MANY_TRIES:
-                    raise
+                    raise (_crowded(around, tries) if around else error) from error
                 tries = _MANY_TRIES
             continue
         moved = moved or not start.as_configured
@@ -130,7 +138,37 @@ def settle(tree: Tree, comments: Comments, folder: Path) -> FeasibleProblem:
             comments["robot", "posture"] += ", moved until capsules, limits and torques have room"
         robot = replace(problem.robot, posture=posture)
         return FeasibleProblem(tree, comments, replace(problem, robot=robot), start)
+    if around:
+        raise _crowded(around, tries)
     raise NoAdmissibleMotionError("No clear posture was found, although limits were loosened.")
+
+
+def _around(task: MotionTask, posture: Array) -> list[tuple[str, str]]:
+    """Capsules too near to obstacles at `posture` (n,), with the obstacles, by name."""
+    return [
+        (constraint.capsules[i].name, constraint.obstacles[j].name)
+        for constraint, columns in unclear(task, posture)
+        if isinstance(constraint, Surroundings)
+        for i, j in (constraint.pairs.checked[column] for column in columns)
+    ]
+
+
+def _crowded(around: list[tuple[str, str]], tries: int) -> NoAdmissibleMotionError:
+    """That obstacles leave no posture, and what to do."""
+    pairs = "; ".join(f"{link} – {thing}" for link, thing in around[:_LISTED])
+    more = f" and {len(around) - _LISTED} more" if len(around) > _LISTED else ""
+    things = dict.fromkeys(thing for _, thing in around)
+    advice = []
+    if FLOOR in things:
+        advice.append(
+            "a lower --floor HEIGHT, or --floor none for a robot that hangs or is bolted to a wall"
+        )
+    if others := [thing for thing in things if thing != FLOOR]:
+        advice.append(f"another place for {', '.join(others)} (--box, --wall)")
+    return NoAdmissibleMotionError(
+        f"No posture of the robot is clear of what stands around it: too near in the best of "
+        f"{tries} are {pairs}{more}. Give {', or '.join(advice)}."
+    )
 
 
 def _write(tree: Tree, problem: Problem, posture: Array) -> None:

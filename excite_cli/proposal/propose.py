@@ -11,7 +11,9 @@ from excite_cli.config.commented_yaml import commented_yaml
 from excite_cli.config.load_spec import apply_override, parse_spec, parsed_spec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.errors import ConfigError, RobotError
+from excite_cli.excitation.problem import with_shapes
 from excite_cli.proposal.assumed_limits import MOST_ACCELERATION, JointPlan, plan_limits
+from excite_cli.proposal.cell import Cell, put_cell
 from excite_cli.proposal.disabled_pairs import chosen_srdf, disabled_pairs
 from excite_cli.proposal.feasibility import (
     Comments,
@@ -21,6 +23,7 @@ from excite_cli.proposal.feasibility import (
     first_posture,
     settle,
 )
+from excite_cli.proposal.floor import Floor, floor_below
 from excite_cli.proposal.joints import JointChoice, choose_joints
 from excite_cli.proposal.shapes import Shapes, choose_shapes
 from excite_cli.proposal.timing import Pace, choose_pace
@@ -60,7 +63,7 @@ class Request:
     urdf: as robot.urdf says it; folder: that of the config, from which paths start; joints: to
     move, empty for a choice of ours; package_dirs, xacro_args: as under robot; srdf: a file, else
     those near the URDF are looked at; overrides: `key.path=value`, of what is proposed; allow:
-    whether a folder outside the robot's own may be read.
+    whether a folder outside the robot's own may be read; cell: what stands around the robot.
     """
 
     urdf: str
@@ -72,6 +75,7 @@ class Request:
     srdf: Path | None = None
     overrides: tuple[str, ...] = ()
     allow: Allow = allow_nothing
+    cell: Cell = field(default_factory=Cell)
 
 
 @dataclass(frozen=True, repr=False)
@@ -136,7 +140,9 @@ def propose(request: Request) -> Proposal:
         comments["constraints", "self_collision", "ignore"] = disabled.in_words
     if len(joints) == 1:
         _with_a_criterion(tree, comments, request.folder)
+    put_cell(request.cell, tree)
     _override(tree, comments, request.overrides)
+    notes += _on_a_floor(tree, comments, request, shapes)
     settled = settle(tree, comments, request.folder)
     notes += shapes.in_words(source)
     notes += disabled.notes if shapes.any else ()
@@ -205,7 +211,7 @@ def _draft(
         comments["constraints", "torque"] = "share of the effort limits, with the URDF's inertias"
     if shapes.any:
         constraints["self_collision"] = _self_collision(shapes, comments)
-    comments["constraints",] = "add surroundings: {floor: 0.0} and more; see docs/configuration.md"
+    comments["constraints",] = "a table, walls and more: see surroundings in docs/configuration.md"
     tree: Tree = {
         "robot": robot,
         "trajectory": {
@@ -243,6 +249,26 @@ def _with_a_criterion(tree: Tree, comments: Comments, folder: Path) -> None:
     if find_base_parameters(robot).rank == 1:
         tree["criterion"] = {"kind": "log_det"}
         comments["criterion", "kind"] = "the condition number of one base parameter is always 1"
+
+
+def _on_a_floor(
+    tree: Tree, comments: Comments, request: Request, shapes: Shapes
+) -> tuple[str, ...]:
+    """Put a floor below a robot with a fixed base, unless one is given; what to say of it."""
+    around = tree["constraints"].get("surroundings", {})
+    said = request.cell.floor is not None or around is None or "floor" in around
+    if said or request.base != "fixed":
+        return ()
+    spec = parsed_spec(tree, "the proposed config")
+    floor = Floor(None, "no shapes are looked at that could be kept above it")
+    if shapes.any and spec.constraints.self_collision is not None:
+        floor = floor_below(with_shapes(build_robot(spec.robot, request.folder), spec.constraints))
+    if floor.height is None:
+        comments["constraints",] = f"no floor: {floor.words}"
+        return (f"no floor: {floor.words}",)
+    tree["constraints"]["surroundings"] = {"floor": floor.height, **around}
+    comments["constraints", "surroundings", "floor"] = f"[m] {floor.words}"
+    return (f"floor: {floor.height:g} m, {floor.words}",)
 
 
 def _override(tree: Tree, comments: Comments, overrides: tuple[str, ...]) -> None:

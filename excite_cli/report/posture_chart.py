@@ -14,7 +14,7 @@ from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.nearest import closest_time, nearest_bodies
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.link_meshes import Poses
-from excite_cli.geometry.obstacles import Box
+from excite_cli.geometry.obstacles import FLOOR, Box, Plane
 from excite_cli.report.chart import Chart, in_figures, side_view, svg_line
 from excite_cli.robot.model import Array
 from excite_cli.trajectory.fade import Segment
@@ -51,8 +51,11 @@ def posture_chart(problem: Problem, motion: Motion) -> Chart:
             f"{near.labels[0]}, distance {in_figures(1e3 * float(near.distances[0]))} mm"
         )
     capsules = " Capsules as the constraints see them." if near is not None else ""
-    caption = f"{words}.{capsules} `excite view` plays all motions."
-    svg = _drawn(_sticks(problem, poses, near), _boxes(problem), near)
+    sticks = _sticks(problem, poses, near)
+    floor = _floor(problem, sticks)
+    ground = " The frame is the floor." if len(floor) else " No floor is modelled."
+    caption = f"{words}.{capsules}{ground} `excite view` plays all motions."
+    svg = _drawn(sticks, _boxes(problem), near, floor)
     return Chart(f"{name} in its first motion", svg, f"{words}.", caption)
 
 
@@ -76,6 +79,22 @@ def _sticks(problem: Problem, poses: Poses, near: NearestBodies | None) -> list[
     return [_Stick(places[parents[j]], places[j], _THIN) for j in range(1, len(places))]
 
 
+def _floor(problem: Problem, sticks: list[_Stick]) -> Array:
+    """Corners (4, 3) of the floor below the robot, in order; (0, 3) where none is modelled."""
+    heights = [
+        each.offset
+        for constraint in problem.constraints
+        for each in constraint.drawing.obstacles
+        if isinstance(each, Plane) and each.name == FLOOR
+    ]
+    if not heights:
+        return np.zeros((0, 3))
+    ends = np.array([[stick.start, stick.end] for stick in sticks]).reshape(-1, 3)
+    (x, y), (far_x, far_y) = ends[:, :2].min(axis=0), ends[:, :2].max(axis=0)
+    corners = [(x, y), (far_x, y), (far_x, far_y), (x, far_y)]
+    return np.column_stack([np.array(corners), np.full(4, heights[0])])
+
+
 def _boxes(problem: Problem) -> list[Array]:
     """Corners (8, 3) of the boxes that stand around."""
     signs = np.array([[1 if k & bit else -1 for bit in (1, 2, 4)] for k in range(8)])
@@ -88,19 +107,25 @@ def _boxes(problem: Problem) -> list[Array]:
     return [(signs * box.half) @ box.rotation.T + box.position for box in found.values()]
 
 
-def _drawn(sticks: list[_Stick], boxes: list[Array], near: NearestBodies | None) -> str:
+def _drawn(
+    sticks: list[_Stick], boxes: list[Array], near: NearestBodies | None, floor: Array
+) -> str:
     """SVG: what is behind first; each capsule with a rim, the nearest in vermilion."""
     ends = np.array([[stick.start, stick.end] for stick in sticks])
     radii = np.array([stick.radius for stick in sticks])
     flat, depth = side_view(ends)
     reach = np.concatenate([flat - radii[:, None, None], flat + radii[:, None, None]])
     corners = [side_view(box)[0] for box in boxes]
-    every = np.vstack([reach.reshape(-1, 2), *corners])
+    level = side_view(floor)[0]
+    every = np.vstack([reach.reshape(-1, 2), *corners, level])
     low, size = every.min(axis=0), np.ptp(every, axis=0)
     room = np.array([_WIDTH, _HEIGHT]) - 2 * _MARGIN
     scale = float((room / np.maximum(size, 1e-9)).min())
     shift = _MARGIN + (room - size * scale) / 2 - low * scale
     parts = [f'<svg viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}">']
+    placed = level * scale + shift
+    for k in range(len(placed)):
+        parts.append(svg_line(placed[k - 1], placed[k], 0.8, "var(--muted)"))
     for box in corners:
         placed = box * scale + shift
         parts += [svg_line(placed[i], placed[j], 0.8, "var(--muted)") for i, j in _EDGES]

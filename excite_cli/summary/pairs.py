@@ -59,9 +59,10 @@ def kept_apart(problem: Problem) -> int:
     return sum(len(c.labels) for c in problem.constraints if c.left_out is not None)
 
 
-def not_modelled_in_words(problem: Problem) -> str:
-    """What the verdict does not speak of."""
-    return f"Not modelled: {'; '.join(not_modelled(problem))}."
+def not_modelled_in_words(missing: Problem | Sequence[str]) -> str:
+    """What the verdict does not speak of: of a problem, or things by name."""
+    things = not_modelled(missing) if isinstance(missing, Problem) else missing
+    return f"Not modelled: {'; '.join(things)}."
 
 
 def pairs_in_words(problem: Problem) -> list[str]:

@@ -27,6 +27,7 @@ from excite_cli.summary.motions import margin_table, motion_table, pairs_of_numb
 from excite_cli.summary.pairs import (
     counted_pairs,
     doubts_in_words,
+    not_modelled_in_words,
     unguarded_in_words,
     unjudged,
 )
@@ -237,6 +238,7 @@ def _pairs(problem: Problem) -> list[Block]:
     return [
         *(Text(words, "bad") for words in unguarded_in_words(problem)),
         *counted_pairs(problem),
+        not_modelled_in_words(problem),
         *([table] if rows else []),
     ]
 

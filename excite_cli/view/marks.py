@@ -73,6 +73,7 @@ class Marks:
             place = np.array([pad, self._camera.height - pad])
             if text.textlength(caption, font=self._font) > self._camera.width - 2 * pad:
                 caption = caption.replace(", ", "\n", 1)
+            caption += f"\n{self._scene.ground_words}"
             self._write(text, place, caption, _INK, anchor="ld")
         return image
 

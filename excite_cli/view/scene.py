@@ -17,7 +17,6 @@ from excite_cli.view.geometry import Body, Colour, robot_bodies
 from excite_cli.view.surface import Surface, box_triangles, capsule_triangles, smooth_surface
 
 PAYLOAD_COLOUR: Colour = (0.85, 0.55, 0.16)
-_NEAR_BASE = 0.02  # [m] by which a robot may be seen below the foot of its base
 _FEW = 24  # instants that tell how far a motion reaches
 
 
@@ -36,7 +35,8 @@ class Scene:
     capsules: those that constraints look at, with a surface for each, in the frames of their
     joints. boxes: solid obstacles in the world, by name; walls: half-spaces other than the floor.
     region: what the centre of mass or the zero-moment point is kept in. contacts: (k, 3) points
-    [m]. ground: height [m] at which the ground is drawn. low, high: (3,) corners of what the
+    [m]. ground: height [m] at which the ground is drawn; ground_words: what it is; solid: whether
+    it is a floor, or else only a plane that the robot may pass. low, high: (3,) corners of what the
     motions reach [m]; outline: (K, 3) outermost points of it [m]. note: what is
     not shown as one might expect.
     """
@@ -50,6 +50,8 @@ class Scene:
     region: GroundPolygon | None
     contacts: Array
     ground: float
+    ground_words: str
+    solid: bool
     low: Array
     high: Array
     outline: Array
@@ -83,7 +85,8 @@ def build_scene(problem: Problem, paths: list[Array], cell: float = 0.0) -> Scen
     outline, foot = _reach(problem, bodies, paths)
     low, high = outline.min(axis=0), outline.max(axis=0)
     floor = next((o.offset for o in obstacles if isinstance(o, Plane) and o.name == FLOOR), None)
-    ground = _ground(floor, kept.height if kept else None, foot, float(low[2]))
+    solid = floor is not None or (kept is not None and kept.height is not None)
+    ground, words = _ground(floor, kept.height if kept else None, foot, float(low[2]))
     boxes = tuple((o.name, _box_surface(o)) for o in obstacles if isinstance(o, Box))
     outline = np.vstack([outline, *(_corners(surface.points) for _, surface in boxes)])
     low, high = outline.min(axis=0), outline.max(axis=0)
@@ -100,6 +103,8 @@ def build_scene(problem: Problem, paths: list[Array], cell: float = 0.0) -> Scen
         region=region,
         contacts=contacts,
         ground=ground,
+        ground_words=words,
+        solid=solid,
         low=np.array([low[0], low[1], min(float(low[2]), ground)]),
         high=high,
         outline=outline,
@@ -154,16 +159,20 @@ def _corners(points: Array) -> Array:
     return np.asarray(points[np.unique((points @ directions.T).argmax(axis=0))])
 
 
-def _ground(floor: float | None, height: float | None, foot: float, lowest: float) -> float:
-    """The floor or the contact's height if there is one, else the foot of the base.
+def _ground(
+    floor: float | None, height: float | None, foot: float, lowest: float
+) -> tuple[float, str]:
+    """Height [m] and what it is: the floor or the contact's, else the plane of the base's foot.
 
-    A robot that reaches below its own foot stands on something: then the lowest point it reaches.
+    A robot whose base has no shapes, or moves, has none of these: then the lowest point reached.
     """
     if floor is not None:
-        return floor
+        return floor, f"floor at {floor:.3g} m"
     if height is not None:
-        return height
-    return foot if np.isfinite(foot) and lowest >= foot - _NEAR_BASE else lowest
+        return height, f"ground at {height:.3g} m"
+    if np.isfinite(foot):
+        return foot, f"plane of the base at {foot:.3g} m, no floor is modelled"
+    return lowest, f"lowest point at {lowest:.3g} m, no floor is modelled"
 
 
 def _main_region(drawings: list[ConstraintScene]) -> GroundRegion | None:

@@ -110,6 +110,9 @@ class SceneNodes:
             shadow_opacity=0.25,
             position=(0.0, 0.0, scene.ground - _LIFTED),
         )
+        self.ground = self._api.add_label(
+            "/ground/words", scene.ground_words, position=(*scene.low[:2], scene.ground)
+        )
         for name, surface in scene.boxes:
             self._mesh(f"/around/{name}", surface, BOX_COLOUR)
         for wall in scene.walls:

@@ -229,6 +229,8 @@ class Studio:
         origins = np.broadcast_to(eye, directions.shape)
         hits = _nearer(sight.still, view.moving.first_hits(origins, directions))
         below = sight.below
+        if not self._scene.solid:  # what is below a plane that is no floor is seen through it
+            below = np.where(np.isfinite(hits.distance), np.inf, below)
         colour = sight.paint.copy()
         on_ground = np.flatnonzero(below < hits.distance)
         places = eye + below[on_ground, None] * directions[on_ground]

@@ -82,6 +82,21 @@ def test_what_is_no_robot_is_one_sentence(
     assert list(excite.folder.iterdir()) == []
 
 
+def test_a_cell_from_the_shell(excite: Program, tmp_path: Path) -> None:
+    arm(tmp_path)
+    told = excite.good("init", "--urdf", "robot.urdf").stdout
+    assert "floor: 0.04 m, the lowest point of what does not move (base)" in told
+    words = ("init", "--urdf", "robot.urdf", "--overwrite", "--floor", "-0.8")
+    boxes = ("--box", "table=1.2,0.8,0.7@1.2,0,-0.45", "--wall", "back=-0.9,0,0:1,0,0")
+    excite.good(*words, *boxes, "--keep-out", "elbow=1.5,2")
+    own = load_spec(tmp_path / "robot.yaml").constraints
+    assert own.surroundings.floor == -0.8
+    assert list(own.surroundings.boxes) == ["table"]
+    assert list(own.surroundings.walls) == ["back"]
+    assert own.keep_out["elbow"] == {"elbow": (1.5, 2.0)}
+    assert "--box t=1: give NAME=LENGTHS@CENTRE" in excite.refused(*words, "--box", "t=1")
+
+
 def test_floating_base_measures_its_wrench(excite: Program, tmp_path: Path) -> None:
     arm(tmp_path)
     excite.good("init", "--urdf", "robot.urdf", "--base", "floating")

@@ -218,7 +218,13 @@ def test_what_is_not_modelled_is_named() -> None:
         "the robot's own links",
     ]
     floor = smoke("constraints.surroundings={floor: -1.0}")
-    assert not_modelled(floor) == ("cables, hoses and tools that are not in the URDF",)
+    cables = "cables, hoses and tools that are not in the URDF"
+    assert not_modelled(floor) == (
+        "all around the robot but the floor (constraints.surroundings)",
+        cables,
+    )
+    both = "{floor: -1.0, walls: {behind: {point: [-2, 0, 0], normal: [1, 0, 0]}}}"
+    assert not_modelled(smoke(f"constraints.surroundings={both}")) == (cables,)
     wall = "{walls: {behind: {point: [-2, 0, 0], normal: [1, 0, 0]}}}"
     assert "the floor" in not_modelled(smoke(f"constraints.surroundings={wall}"))[0]
 

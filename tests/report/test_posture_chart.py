@@ -5,12 +5,14 @@ import re
 import numpy as np
 import pytest
 
+from excite_cli.api.loading import load_problem
 from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.excitation.nearest import closest_time
 from excite_cli.geometry.coal_distances import CoalDistances
 from excite_cli.report.chart import in_figures
 from excite_cli.report.posture_chart import posture_chart
 from excite_cli.trajectory.fade import Segment
+from tests.cli.program import SMOKE
 from tests.report.case import Case
 
 PATH = re.compile(
@@ -58,3 +60,22 @@ def test_all_of_it_is_within_the_drawing(svg: str) -> None:
         for x, y in (ends[:2], ends[2:]):
             assert float(stroke) / 2 <= float(x) <= width - float(stroke) / 2
             assert float(stroke) / 2 <= float(y) <= height - float(stroke) / 2
+
+
+def test_a_floor_is_drawn_where_it_is(case: Case, svg: str) -> None:
+    """Four thin lines; the lower the floor, the lower they are drawn."""
+    problem, result = case
+    assert "No floor is modelled." in posture_chart(problem, result.motions[0]).caption
+    found = []
+    for height in (-0.3, -0.6):
+        low = load_problem(SMOKE, [f"constraints.surroundings={{floor: {height}}}"])
+        chart = posture_chart(low, result.motions[0])
+        assert "The frame is the floor." in chart.caption
+        lines = [each for each in PATH.findall(chart.svg) if each[5] == "0.8"]
+        assert len(lines) == 4
+        assert not [each for each in PATH.findall(svg) if each[5] == "0.8"]
+        kept = next(each for each in low.constraints if isinstance(each, SelfCollision))
+        middle = np.mean([(float(each[1]) + float(each[3])) / 2 for each in lines])
+        robot = [float(each[1]) for each in PATH.findall(chart.svg) if each[5] != "0.8"]
+        found.append((middle - max(robot)) / _scale(chart.svg, kept))
+    assert found[1] - found[0] == pytest.approx(0.3 * np.cos(np.deg2rad(18)), rel=0.1)

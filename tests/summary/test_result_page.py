@@ -313,7 +313,9 @@ def test_without_limits_cards_speak_of_peaks(case: Case) -> None:
 
 def test_the_margins_say_of_which_pairs_they_speak(case: Case) -> None:
     problem, result = case
-    assert "all 7 relevant" in _said(margin_section(result, problem))
+    said = _said(margin_section(result, problem))
+    assert "all 7 relevant" in said
+    assert "Not modelled: the floor and all else around the robot" in said
     config = "constraints.self_collision.ignore=[[base, wrist]]"
     problem = load_problem(SMOKE, [config])
     section = margin_section(result, problem)

@@ -80,6 +80,8 @@ def test_the_player_moves_the_robot(problem: Problem, segment: Segment, port: in
     server = _server(viser, Serving(port=port), "arm")
     try:
         stage = SceneNodes(server, scene)
+        assert stage.ground.text == "floor at -0.6 m"
+        assert stage.ground.position[2] == -0.6
         longer = replace(segment, name="slow", trajectory=segment.trajectory.slowed(0.5))
         player = _Player(server, stage, problem, [segment, longer], Serving())
         began = time.monotonic()

@@ -9,8 +9,11 @@ import pytest
 from excite_cli.excitation.problem import Problem
 from excite_cli.trajectory.fade import Segment
 from excite_cli.view import pictures
+from excite_cli.view.camera import fitted_camera
+from excite_cli.view.instants import instants_of
 from excite_cli.view.pictures import View, motion_gif, still_png
-from excite_cli.view.studio import QUICK
+from excite_cli.view.scene import build_scene
+from excite_cli.view.studio import QUICK, Studio
 from excite_cli.workers.base import Workers
 from excite_cli.workers.catalogue import open_workers
 
@@ -54,6 +57,23 @@ def test_what_can_be_shown_beside_it(
     look = replace(SMALL, **{what: 3 if what == "ghosts" else True})
     change = np.abs(_pixels(still_png(problem, segment, look, time=1.0)) - _pixels(plain))
     assert (change.max(axis=2) > 8).mean() > 0.002
+
+
+def test_a_robot_is_seen_through_a_plane_that_is_no_floor(
+    problem: Problem, segment: Segment
+) -> None:
+    """Half of it is below the plane, as on a robot that hangs from it."""
+    times = np.array([1.0])
+    scene = build_scene(problem, [segment.trajectory.states(times, segment.coefficients)[0]])
+    scene = replace(scene, ground=float(scene.center[2]) + 0.3)
+    camera = fitted_camera(scene.outline, SMALL.size, SMALL.azimuth, SMALL.elevation)
+    poses = instants_of(problem, segment, times).poses
+    hidden, seen = (
+        Studio(replace(scene, solid=solid), camera, SMALL.azimuth, QUICK).picture(poses, 0)
+        for solid in (True, False)
+    )
+    dark = [(picture.max(axis=2) < 150).mean() for picture in (hidden, seen)]
+    assert dark[1] > dark[0] + 0.01
 
 
 def test_other_instants_and_sides_look_different(

@@ -108,17 +108,25 @@ def test_mirrored_meshes_face_outwards(tmp_path: Path) -> None:
         assert np.einsum("kx,kx->k", a, np.cross(b, c)).sum() / 6 == pytest.approx(0.048)
 
 
-def test_the_ground_is_the_foot_of_the_base_or_what_is_reached(
-    problem: Problem, segment: Segment
+def test_the_ground_is_the_floor_or_the_plane_of_the_base(
+    problem: Problem, scene: Scene, tmp_path: Path
 ) -> None:
+    """Where it is, however far below a motion reaches, and called what it is."""
+    assert (scene.ground_words, scene.solid) == ("floor at -0.6 m", True)
     bare = replace(problem, constraints=())
     up = np.zeros((1, problem.robot.n))
-    foot = build_scene(bare, [up]).ground
     down = up.copy()
-    down[0, problem.robot.joint_names.index("shoulder_pitch")] = 2.0
+    down[0, problem.robot.joint_names.index("shoulder_pitch")] = 3.0
     reached = build_scene(bare, [up, down])
-    assert reached.ground <= foot
-    assert reached.ground == pytest.approx(min(foot, reached.outline[:, 2].min()))
+    foot = min(body.surface.points[:, 2].min() for body in reached.bodies if body.joint == 0)
+    assert reached.ground == foot
+    assert reached.low[2] < foot
+    assert reached.ground_words == f"plane of the base at {foot:.3g} m, no floor is modelled"
+    assert not reached.solid
+    # A base without shapes has no plane.
+    still = replace(bare, robot=_robot(tmp_path, "", f"<collision>{BOX}</collision>"))
+    lowest = build_scene(still, [np.zeros((1, 1))])
+    assert lowest.ground_words == "lowest point at 0.4 m, no floor is modelled"
 
 
 TURNED = CORNERS @ np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])  # a quarter about x
