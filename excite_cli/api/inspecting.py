@@ -12,6 +12,7 @@ from excite_cli.api.loading import (
     as_recorded,
     completed,
     inputs_of,
+    load_data,
     measured_case,
 )
 from excite_cli.api.outputs import held
@@ -23,10 +24,14 @@ from excite_cli.checks.check_result import CheckResult
 from excite_cli.checks.sentences import BELONG, written
 from excite_cli.checks.trust import but_trusted, check_names
 from excite_cli.config.commented_yaml import amended, changed_values, with_values
+from excite_cli.config.constraints_spec import ConstraintsSpec
 from excite_cli.config.load_spec import load_spec, spec_of
 from excite_cli.config.plain_yaml import yaml_text
+from excite_cli.config.task_spec import TaskSpec
+from excite_cli.diagnosis.measured_prior import measured_stack
 from excite_cli.errors import ExciteError
-from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.power import EffectPower, sizes_shown
+from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.dataset import Dataset, joined, merged
@@ -34,6 +39,7 @@ from excite_cli.report.page import render
 from excite_cli.robot.model import build_robot
 from excite_cli.shown.note import Tell, log_note
 from excite_cli.shown.record import Shown, show
+from excite_cli.summary.expectation import noise_in_words
 from excite_cli.summary.inspection import headline, inspection_page, inspection_parts
 from excite_cli.summary.inspection import inspection_answer as inspection_answer
 
@@ -42,11 +48,17 @@ _ROUNDS = 4  # of looking, each with what the one before would set
 
 @dataclass(frozen=True, repr=False)
 class LogInspection(Shown):
-    """`results` in the order of the checks; `settings`: what would change in the config."""
+    """`results` in the order of the checks; `settings`: what would change in the config.
+
+    `power`: sizes of effects that a diagnosis would name with 95 %, if they were asked for, of
+    torques with this `noise`.
+    """
 
     results: tuple[CheckResult, ...]
     settings: Mapping[str, Any] = field(default_factory=dict)
     runs: tuple[str, ...] = ()
+    power: tuple[EffectPower, ...] = ()
+    noise: str = ""
 
     @property
     def good(self) -> bool:
@@ -64,6 +76,7 @@ def inspect(
     *,
     apply: str | Path | None = None,
     output: str | Path | None = None,
+    power: bool = False,
     overwrite: bool = False,
     tell: Tell = log_note,
 ) -> LogInspection:
@@ -72,7 +85,8 @@ def inspect(
     Without `data` the description alone is judged. What would settle what is seen in the files is
     tried, and the data are looked at once more with it, before the dynamics are. With `apply` the
     config that says so is written, its comments kept; where nothing is to be changed, as it is.
-    `output`: a page (HTML) of all checks.
+    `output`: a page (HTML) of all checks; `power`: also the sizes of effects that a diagnosis of
+    the data would name.
 
     Returns
     -------
@@ -116,12 +130,33 @@ def inspect(
                 break
             case = _changed(case, more)
         inspection = LogInspection(rows.in_order(found, bool(files), case.spec), settings, runs)
+        if power:
+            shown = power_of_data(case, load_data(case, files, tell))
+            inspection = replace(inspection, power=shown, noise=noise_in_words(case.spec))
         if apply is not None:
             _write(Path(apply), problem, settings)
         if page is not None:
             title = f"Set-up of {case.robot.name}"
             write_text_atomically(page, render(inspection_page(inspection, title)))
         return inspection
+
+
+def power_of_data(case: Case, data: Dataset) -> tuple[EffectPower, ...]:
+    """Sizes of effects that a diagnosis of `data` would name with 95 %; the last run is held out.
+
+    Raises
+    ------
+    FileError
+        A run is too short, or nothing in the data can be used.
+    """
+    spec, kept = case.spec, data.runs[: max(1, len(data.runs) - 1)]
+    criterion = spec.criterion.model_copy(update={"kind": "predicted_torque"})
+    bare = ConstraintsSpec(joint_limits=spec.constraints.joint_limits)  # no motion is sought
+    update = {"criterion": criterion, "constraints": bare, "task": TaskSpec()}
+    problem = build_problem(spec.model_copy(update=update), case.folder)
+    assert problem.prediction is not None
+    stack, _ = measured_stack(problem, replace(data, runs=kept))
+    return sizes_shown(problem.prediction, stack, spec.diagnosis.significance)
 
 
 def _in_vain(settings: Mapping[str, Any], error: ExciteError) -> CheckResult:

@@ -35,6 +35,10 @@ def inspect(
             rich_help_panel=OUTPUT,
         ),
     ] = None,
+    power: Annotated[
+        bool,
+        typer.Option("--power", help="Also the sizes of effects that a diagnosis would name."),
+    ] = False,
     overrides: options.Set = None,
     overwrite: options.Overwrite = False,
     as_json: options.Json = False,
@@ -53,20 +57,25 @@ def inspect(
 
     Examples:
       excite inspect ur10.yaml measured.h5 --apply corrected.yaml
+      excite inspect ur10.yaml measured.h5 --power
     """
     from excite_cli.api.inspecting import inspect as inspect_data
     from excite_cli.api.inspecting import inspection_answer
     from excite_cli.api.loading import load_case
     from excite_cli.api.working import single_threaded
+    from excite_cli.errors import ConfigError
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     files = data or []
+    if power and not files:
+        raise ConfigError("--power is of measured data: give their files.")
     with single_threaded():
         found = inspect_data(
             load_case(config, overrides or ()),
             files,
             apply=apply,
             output=output,
+            power=power,
             overwrite=overwrite,
             tell=terminal.tell,
         )

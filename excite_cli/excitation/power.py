@@ -14,7 +14,7 @@ and the size that is named with 95 % is about s (√c + 1.645). What a diagnosis
 of the motions.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -29,6 +29,7 @@ SURE = 0.95
 # χ² of columns that are shifted in time exceeds that of chance by this factor: the median of the
 # placebos of real logs.
 _INFLATION = 1.5
+_FREE = 1e-3  # of the precision of inertias
 
 
 @dataclass(frozen=True)
@@ -77,8 +78,14 @@ def power_of(
 
 
 def _deviations(prediction: Prediction, stack: Stack) -> np.ndarray:
-    """s of the first parameter of every effect, infinite where the motions say nothing of it."""
-    covariance = np.linalg.inv(prediction.information(stack.factor))
+    """s of the first parameter of every effect, infinite where the motions say nothing of it.
+
+    A diagnosis takes from the inertias all that they can explain: their prior is next to none.
+    """
+    prior, rank = prediction.prior.copy(), prediction.rank
+    prior[:rank, :rank] *= _FREE
+    known = replace(prediction, prior=prior)
+    covariance = np.linalg.inv(known.information(stack.factor))
     variance = np.diag(covariance)[prediction.first_columns]
     informed = np.maximum(1.0 / variance - 1.0, 0.0)
     with np.errstate(divide="ignore"):

@@ -53,7 +53,7 @@ _EVERYDAY_SHARE, _SHARE = 0.3, 0.1
 # a UR10's wrists is 1 to 2 N·m, of 54, and their URDF's inertias make 0.1 N·m.
 _OF_EFFORT = 0.05
 # Noise of a torque: a share of the joint's usual torque. Real logs have 0.5 to 5 %.
-_NOISE = 0.02
+NOISE = 0.02
 _LEAST = 1e-3  # of the largest usual torque, where neither is known
 _RARE = 10.0  # `Effect.prior_cost` [χ²] of what one robot in a hundred has
 _STATES = 500
@@ -235,7 +235,7 @@ def _usual_torque(robot: Robot, base: BaseParameters, phi: Array, states: _State
 
 def _noise(spec: Spec, robot: Robot, usual: Array) -> Array:
     """Standard deviation (R,) of the torque noise: 1/`criterion.row_weights`, or the usual one."""
-    weights, noise = spec.criterion.row_weights, _NOISE * usual
+    weights, noise = spec.criterion.row_weights, NOISE * usual
     if not isinstance(weights, str):
         for k, name in enumerate(robot.row_names):
             noise[k] = 1.0 / weights[name] if name in weights else noise[k]

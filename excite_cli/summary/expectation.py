@@ -4,8 +4,10 @@ from typing import Any
 
 import numpy as np
 
+from excite_cli.config.spec import Spec
 from excite_cli.excitation.expectation import Expectation
 from excite_cli.excitation.power import EffectPower
+from excite_cli.excitation.prediction import NOISE
 from excite_cli.excitation.problem import Problem
 from excite_cli.shown.answer import Parts, Table
 
@@ -21,7 +23,16 @@ def expectation_parts(problem: Problem, found: Expectation, asked: bool) -> Part
         f"Predicted torques deviate by {after} times the noise of one sample after {numbers} "
         f"(RMS, {where_in_words(problem)}{beside})."
     )
-    return [words, _asked_table(found.power) if asked else _power_table(found.power)]
+    noise = noise_in_words(problem.spec)
+    table = _asked_table(found.power, noise) if asked else power_table(found.power, noise)
+    return [words, table]
+
+
+def noise_in_words(spec: Spec) -> str:
+    """Which noise of the torques these figures were made with."""
+    given, rate = spec.criterion.row_weights, spec.task.rate
+    level = "1/criterion.row_weights" if isinstance(given, dict) else f"{NOISE:.0%} of that torque"
+    return f"noise: {level} in {rate:g} independent samples a second"
 
 
 def where_in_words(problem: Problem) -> str:
@@ -34,7 +45,8 @@ def where_in_words(problem: Problem) -> str:
     return "at states within the limits"
 
 
-def _power_table(power: tuple[EffectPower, ...]) -> Table:
+def power_table(power: tuple[EffectPower, ...], noise: str) -> Table:
+    """Of every kind the joints on which the smallest and the largest size would be named."""
     rows = []
     for kind in dict.fromkeys(each.kind for each in power):
         of = [each for each in power if each.kind == kind]
@@ -42,8 +54,8 @@ def _power_table(power: tuple[EffectPower, ...]) -> Table:
         worst = max(of, key=lambda each: each.share)
         rows.append((kind, _share(best), ", ".join(best.joints), _share(worst), _joints(worst)))
     return Table(
-        "Effects that these motions would show: size named with 95%, as a share of the joint's "
-        "usual torque",
+        "Effects that a diagnosis would name with 95%: size as a share of the "
+        f"joint's usual torque ({noise})",
         ("effect", "size", "most visible on", "size there", "least visible on"),
         tuple(rows),
         left=("effect", "most visible on", "least visible on"),
@@ -58,13 +70,13 @@ def _joints(each: EffectPower) -> str:
     return ", ".join(each.joints)
 
 
-def _asked_table(power: tuple[EffectPower, ...]) -> Table:
+def _asked_table(power: tuple[EffectPower, ...], noise: str) -> Table:
     rows = tuple(
         (each.kind, _joints(each), f"{each.size:.3g}", each.unit, f"{each.power:.0%}")
         for each in power
     )
     return Table(
-        "Probability that these motions show it",
+        f"Probability that a diagnosis names it ({noise})",
         ("effect", "on", "size", "unit", "named"),
         rows,
         left=("effect", "on", "unit"),

@@ -5,6 +5,7 @@ from typing import Any, Protocol
 
 from excite_cli.checks.check_result import CheckResult
 from excite_cli.checks.sentences import written
+from excite_cli.excitation.power import EffectPower
 from excite_cli.fields import data_of
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.shown.answer import (
@@ -20,6 +21,7 @@ from excite_cli.shown.answer import (
     as_word,
 )
 from excite_cli.shown.record import show
+from excite_cli.summary.expectation import power_data, power_table
 
 # Measured data in words, and their runs as a table.
 
@@ -72,6 +74,14 @@ class AnyInspection(Protocol):
     @property
     def settings(self) -> Mapping[str, Any]:
         """What would change in the config."""
+
+    @property
+    def power(self) -> tuple[EffectPower, ...]:
+        """Sizes of effects that a diagnosis would name, where they were asked for."""
+
+    @property
+    def noise(self) -> str:
+        """In words, the noise of torques that these sizes belong to."""
 
     @property
     def good(self) -> bool:
@@ -128,6 +138,8 @@ def _parts(
     found: AnyInspection, config: str, data: tuple[str, ...], written_to: Mapping[str, str | None]
 ) -> list[Part]:
     parts: list[Part] = [headline(found), checks_table(found), *remarks(found)]
+    if found.power:
+        parts.append(power_table(found.power, found.noise))
     applied, page = written_to.get("apply"), written_to.get("page")
     if page is not None:
         parts.append(f"Written: {page} (page).")
@@ -180,6 +192,7 @@ def _data(found: AnyInspection, applied: str | None) -> dict[str, Any]:
         "checks": [
             {**data_of(each, *own), "key": written(each.settings)} for each in found.results
         ],
+        **({"power": power_data(found.power)} if found.power else {}),
     }
 
 
