@@ -29,8 +29,8 @@ from excite_cli.config.load_spec import load_spec, spec_of
 from excite_cli.config.plain_yaml import yaml_text
 from excite_cli.config.task_spec import TaskSpec
 from excite_cli.diagnosis.measured_prior import measured_stack
+from excite_cli.diagnosis.power import EffectPower, sizes_shown
 from excite_cli.errors import ExciteError
-from excite_cli.excitation.power import EffectPower, sizes_shown
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing

@@ -17,7 +17,6 @@ from excite_cli.diagnosis.words import no_gain_in_words
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.excitation.ending import most_motions as most_motions
-from excite_cli.excitation.expectation import predicting
 from excite_cli.excitation.motion import Doubt
 from excite_cli.excitation.planned_prior import planned_stack
 from excite_cli.excitation.problem import Problem
@@ -26,6 +25,7 @@ from excite_cli.excitation.result import Result
 from excite_cli.excitation.run import continue_run, new_result, resumed_result
 from excite_cli.excitation.sequence import FinishedMotion
 from excite_cli.excitation.stack import Stack
+from excite_cli.excitation.with_prediction import predicting
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis

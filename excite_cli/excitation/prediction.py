@@ -68,7 +68,8 @@ class Prediction:
     `weighting`: 1/noise of the rows of a cost instant, and deviations of base parameters;
     `extension`: declared effects, then those that the robot may have, scaled by their deviations;
     `prior` R (c, c); `work` Φ (N, c), c = r + k; `usual` (R,): usual torque of a row [N·m, N];
-    `shares` (k,): of it, what an effect with the prior deviation makes.
+    `noise` (R,): of it, the noise of a sample; `shares` (k,): of it, what an effect with the prior
+    deviation makes.
     """
 
     weighting: Weighting
@@ -76,6 +77,7 @@ class Prediction:
     prior: Array
     work: Array
     usual: Array
+    noise: Array
     shares: Array
 
     @property
@@ -215,7 +217,7 @@ def build_prediction(
     seen = extension.columns().evaluate(np.arange(float(len(work[0]))), *work)
     both = np.concatenate([y, seen.columns * extension.scales], axis=2) / noise[:, None]
     rows_of_work = both.reshape(-1, both.shape[2])
-    return Prediction(weighting, extension, prior, rows_of_work, usual, shares)
+    return Prediction(weighting, extension, prior, rows_of_work, usual, noise / usual, shares)
 
 
 def _split(states: Array) -> _States:

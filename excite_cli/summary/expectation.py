@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from excite_cli.config.spec import Spec
-from excite_cli.excitation.expectation import Expectation
-from excite_cli.excitation.power import EffectPower
+from excite_cli.diagnosis.expectation import Expectation
+from excite_cli.diagnosis.power import EffectPower
 from excite_cli.excitation.prediction import NOISE
 from excite_cli.excitation.problem import Problem
 from excite_cli.shown.answer import Parts, Table

@@ -5,7 +5,7 @@ from typing import Any, Protocol
 
 from excite_cli.checks.check_result import CheckResult
 from excite_cli.checks.sentences import written
-from excite_cli.excitation.power import EffectPower
+from excite_cli.diagnosis.power import EffectPower
 from excite_cli.fields import data_of
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.shown.answer import (

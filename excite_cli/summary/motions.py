@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from excite_cli.config.spec import UntilSpec
+from excite_cli.diagnosis.expectation import expectation
 from excite_cli.diagnosis.next_motion import NextMotion
 from excite_cli.excitation.dense_grid import flattered
 from excite_cli.excitation.ending import Ending
-from excite_cli.excitation.expectation import expectation
 from excite_cli.excitation.invariant import Invariants, design_for, invariants
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.not_modelled import not_modelled

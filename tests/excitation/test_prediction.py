@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from excite_cli.diagnosis.expectation import expectation
+from excite_cli.diagnosis.power import power_of, price, sizes_shown
 from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.errors import ConfigError
-from excite_cli.excitation.expectation import expectation, predicting
 from excite_cli.excitation.gradient_check import check_gradient
 from excite_cli.excitation.not_modelled import not_modelled
-from excite_cli.excitation.power import power_of, price, sizes_shown
 from excite_cli.excitation.prediction import PredictedTorques, Prediction
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.stack import Stack
+from excite_cli.excitation.with_prediction import predicting
 from tests.excitation.smoke import drawn, planned, smoke
 
 FOR_WORK = "criterion.kind=predicted_torque"

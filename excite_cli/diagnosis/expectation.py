@@ -3,15 +3,14 @@
 The same figures whatever the motions were planned for, and with whatever weights.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 
-from excite_cli.effects.base import Effect
-from excite_cli.excitation.power import EffectPower, power_of, sizes_shown
-from excite_cli.excitation.prediction import build_prediction
-from excite_cli.excitation.problem import Problem, acceleration_bounds, on_fine_grid
+from excite_cli.diagnosis.power import EffectPower, power_of, sizes_shown
+from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.stack import Stack
+from excite_cli.excitation.with_prediction import predicting
 
 
 @dataclass(frozen=True)
@@ -66,37 +65,3 @@ def expectation(
         power if asked else sizes_shown(prediction, stack, alpha),
         same or not earlier.rows,
     )
-
-
-def predicting(
-    problem: Problem, kinds: Sequence[str] = (), possible: Sequence[Effect] | None = None
-) -> Problem:
-    """The problem with its prediction, in which these kinds of effects are possible, too.
-
-    Made for another criterion, or without one of them, it gets a prediction beside that, with the
-    effects `possible` in place of the usual ones.
-    """
-    there = {effect.kind for effect in problem.extension.effects}
-    if problem.prediction is not None and there.issuperset(kinds):
-        return problem
-    made = build_prediction(
-        problem.spec,
-        problem.robot,
-        problem.base,
-        [] if problem.prediction is not None else problem.extension.effects,
-        acceleration_bounds(problem.spec, problem.robot),
-        problem.trajectory.duration,
-        len(problem.cost_basis.times),
-        problem.work,
-        kinds,
-        possible,
-    )
-    wide = replace(
-        problem,
-        weighting=made.weighting,
-        extension=made.extension,
-        prediction=made,
-        separation=None,
-        metric=None,
-    )
-    return on_fine_grid(wide) if made.extension.fine else wide

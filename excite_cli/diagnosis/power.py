@@ -11,7 +11,8 @@ A diagnosis names it where it saves more χ² than its price c (`price`). With t
     P(χ²₁(z²/s²) > c) = Φ(z/s − √c) + Φ(−z/s − √c),
 
 and the size that is named with 95 % is about s (√c + 1.645). What a diagnosis holds out is no part
-of the motions.
+of the motions. Nor does it name what its rules say is too small to matter (`least_share`), however
+surely it is there.
 """
 
 from dataclasses import dataclass, replace
@@ -20,8 +21,9 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import chi2, norm
 
+from excite_cli.diagnosis import rules
 from excite_cli.effects.base import Effect
-from excite_cli.effects.catalogue import catalogue
+from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION, catalogue
 from excite_cli.excitation.prediction import Prediction
 from excite_cli.excitation.stack import Stack
 
@@ -73,6 +75,8 @@ def power_of(
         effect, scale, share = _about(prediction, at)
         if effect.kind == kind:
             chance = _chance(size / scale / deviation, price(type(effect), significance))
+            if share * size / scale < least_share(prediction, effect):
+                chance = 0.0
             found.append(_record(prediction, effect, size, share * size / scale, chance))
     return tuple(found)
 
@@ -98,7 +102,22 @@ def _shown(
     effect, scale, share = _about(prediction, at)
     cost = price(type(effect), significance)
     size = times_named(cost, power) * deviation if np.isfinite(deviation) else float("inf")
+    size = max(size, least_share(prediction, effect) / share)
     return _record(prediction, effect, size * scale, size * share, power)
+
+
+def least_share(prediction: Prediction, effect: Effect) -> float:
+    """Share of its joint's usual torque, RMS, below which a diagnosis names no such effect.
+
+    What every robot has must also make an error of its joint noticeably larger, or matter.
+    """
+    if effect.kind not in {*EVERYDAY_FRICTION, *EVERYDAY}:
+        return rules.SMALLEST
+    robot = prediction.extension.robot
+    rows = {int(row): k for k, row in enumerate(robot.rows)}
+    own = [rows[int(robot.moved[j])] for j in effect.rows(robot.n) if int(robot.moved[j]) in rows]
+    of_left = rules.OF_WHAT_IS_LEFT * float(prediction.noise[own].min())
+    return max(rules.SMALLEST, min(rules.MATTERS, of_left))
 
 
 def times_named(cost: float, power: float) -> float:
