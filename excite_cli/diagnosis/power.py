@@ -59,10 +59,14 @@ def price(kind: type[Effect], significance: float) -> float:
 def sizes_shown(
     prediction: Prediction, stack: Stack, significance: float, power: float = SURE
 ) -> tuple[EffectPower, ...]:
-    """For every effect that the robot may have, the size that the motions in `stack` would show."""
+    """For every effect that the robot may have, the size that the motions in `stack` would show.
+
+    Those that are declared are in the model whatever their size.
+    """
     return tuple(
         _shown(prediction, at, deviation, significance, power)
         for at, deviation in enumerate(_deviations(prediction, stack))
+        if at >= prediction.declared
     )
 
 

@@ -68,7 +68,8 @@ class Prediction:
     `weighting`: 1/noise of the rows of a cost instant, and deviations of base parameters;
     `extension`: declared effects, then those that the robot may have, scaled by their deviations;
     `prior` R (c, c); `work` Φ (N, c), c = r + k; `usual` (R,): usual torque of a row [N·m, N];
-    `noise` (R,): of it, the noise of a sample; `shares` (k,): of it, what an effect with the prior
+    `declared`: how many of the effects the model has; `noise` (R,): of the usual torque, the noise
+    of a sample; `shares` (k,): of it, what an effect with the prior
     deviation makes.
     """
 
@@ -79,6 +80,7 @@ class Prediction:
     usual: Array
     noise: Array
     shares: Array
+    declared: int = 0
 
     @property
     def rank(self) -> int:
@@ -217,7 +219,10 @@ def build_prediction(
     seen = extension.columns().evaluate(np.arange(float(len(work[0]))), *work)
     both = np.concatenate([y, seen.columns * extension.scales], axis=2) / noise[:, None]
     rows_of_work = both.reshape(-1, both.shape[2])
-    return Prediction(weighting, extension, prior, rows_of_work, usual, noise / usual, shares)
+    count = sum(effect in declared for effect in extension.effects)
+    return Prediction(
+        weighting, extension, prior, rows_of_work, usual, noise / usual, shares, count
+    )
 
 
 def _split(states: Array) -> _States:

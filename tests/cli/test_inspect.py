@@ -136,3 +136,15 @@ def test_what_settles_one_thing_and_spoils_the_data_is_not_set(program: Program)
     (vain,) = [each for each in answer["checks"] if "cannot be used" in each["evidence"]]
     assert vain["evidence"].startswith("with measurement.time: ns and ")
     assert "the data cannot be used: run 'a': samples come at 2e+11 Hz" in vain["evidence"]
+
+
+def test_power_of_data_is_told_where_it_is_asked_for(program: Program) -> None:
+    answer = json.loads(program("inspect", "arm.yaml", "log.h5", "--power", "--json").stdout)
+    sizes = {(each["kind"], *each["joints"]): each for each in answer["power"]}
+    assert ("viscous_friction", "elbow_joint") not in sizes  # is declared
+    found = sizes["load_dependent_friction", "elbow_joint"]
+    assert 0.0 < found["share_of_torque"] < 1.0
+    plain = json.loads(program("inspect", "arm.yaml", "log.h5", "--json").stdout)
+    assert "power" not in plain
+    refused = program.refused("inspect", "arm.yaml", "--power")
+    assert "--power is of measured data: give their files." in refused

@@ -6,13 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from excite_cli.config.spec import Spec
+from excite_cli.diagnosis.expectation import expectation
 from excite_cli.diagnosis.next_motion import NextMotion, next_experiment, plan_after
-from excite_cli.diagnosis.records import EffectRecord
+from excite_cli.diagnosis.records import Diagnosis, EffectRecord
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.errors import FileError
 from excite_cli.excitation.admissible import worst_margins
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.run import continue_run, new_result
+from excite_cli.excitation.stack import Stack
 from tests.diagnosis.synthetic_diagnosis import (
     CONFIG,
     NOISE,
@@ -170,3 +173,54 @@ def test_diagnoses_that_do_not_fit() -> None:
     ):
         with pytest.raises(FileError, match=words):
             plan_after(replace(made, **change), smoke_spec(), CONFIG.parent)
+
+
+# Planned for the torques of the work.
+
+FOR_WORK = "criterion.kind=predicted_torque"
+
+
+def _known(possible: tuple[EffectRecord, ...], spec: Spec) -> tuple[Diagnosis, NextMotion]:
+    """A diagnosis without aliases that tested `possible` effects, and what follows."""
+    found = make_diagnosis(rivals=possible)
+    about = replace(found.information, rivals=(), possible=possible)
+    effects = tuple(replace(each, aliases=()) for each in found.effects)
+    found = replace(found, effects=effects, information=about)
+    return found, plan_after(found, spec, CONFIG.parent)
+
+
+def test_planned_for_the_work_the_data_count_for_what_was_tested_too() -> None:
+    possible = (replace(COULOMB, joints=("slide",)),)
+    found, planned = _known(possible, smoke_spec(FOR_WORK))
+    assert "excites the model with its 1 effect and 1 that it may have" in planned.messages[0]
+    assert planned.problem is planned.model
+    kinds = [each.kind for each in planned.problem.extension.effects]
+    assert kinds == ["viscous_friction", "coulomb_friction"]
+    whole = np.asarray(found.information.factor) * planned.problem.column_scales
+    assert np.allclose(planned.prior.factor.T @ planned.prior.factor, whole.T @ whole)
+    assert planned.known is not None
+    problem, data = planned.known
+    assert problem is planned.problem
+    result = run(planned)
+    told = expectation(planned.model, result, known=planned.known)
+    assert told.all_data
+    alone = expectation(planned.model, replace(result, prior_stack=Stack.empty(problem.columns)))
+    assert told.deviations[0] < alone.deviations[0]
+    assert result.motions[0].predicted_deviation == pytest.approx(told.deviations[0])
+    assert problem.prediction is not None
+    assert told.deviations[0] < problem.prediction.deviation(data.factor)
+
+
+def test_planned_for_another_criterion_it_is_predicted_with_the_data_as_well() -> None:
+    found, planned = _known((replace(COULOMB, joints=("slide",)),), smoke_spec())
+    assert planned.problem.prediction is None
+    assert planned.known is not None
+    problem, data = planned.known
+    assert problem.prediction is not None
+    assert data.rows == len(found.information.factor)
+
+
+def test_aliases_are_separated_whatever_motions_are_planned_for() -> None:
+    planned = plan_after(make_diagnosis(), smoke_spec(FOR_WORK), CONFIG.parent)
+    assert planned.purpose == "separate"
+    assert planned.problem.separation is not None

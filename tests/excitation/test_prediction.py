@@ -4,11 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
 
 from excite_cli.diagnosis.expectation import expectation
-from excite_cli.diagnosis.power import power_of, price, sizes_shown
-from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.gradient_check import check_gradient
 from excite_cli.excitation.not_modelled import not_modelled
@@ -124,62 +121,6 @@ def test_figures_are_the_same_whatever_the_motions_were_planned_for(problem: Pro
     assert expectation(plain, result).deviations == pytest.approx(
         expectation(problem, result).deviations
     )
-
-
-# Effects that motions would show.
-
-
-def test_an_effect_of_the_size_told_is_found_as_often_as_told(problem: Problem) -> None:
-    """By a likelihood ratio on drawn data, against the price; the other parameters are unknown."""
-    prediction, rng = of(problem), np.random.default_rng(3)
-    block = problem.objective().block(drawn(problem, 0.3, 1))
-    stack = Stack.empty(problem.columns).with_rows(block)
-    kind = "load_dependent_friction"
-    at = next(k for k, e in enumerate(prediction.extension.effects) if e.kind == kind)
-    column = int(prediction.first_columns[at])
-    shown = sizes_shown(prediction, stack, 0.01, power=0.8)[at]
-    size = shown.size / prediction.extension.scales[column - prediction.rank]
-    rest = np.delete(np.arange(problem.columns), column)
-    prior = prediction.prior
-    named = 0
-    for _ in range(400):
-        z = np.linalg.solve(prior, rng.normal(size=len(prior)))
-        z[column] = size
-        rows = np.concatenate([block @ z + rng.normal(size=len(block)), np.zeros(len(prior))])
-        both = np.vstack([block, prior])
-        both[len(block) :, column] = 0.0
-        saved = _left(both[:, rest], rows) - _left(both, rows)
-        named += saved > price(kind_named(kind), 0.01)
-    assert named / 400 == pytest.approx(0.8, abs=0.06)
-
-
-def _left(matrix: np.ndarray, rows: np.ndarray) -> float:
-    solution = np.linalg.lstsq(matrix, rows, rcond=None)[0]
-    return float(np.sum(np.square(rows - matrix @ solution)))
-
-
-def test_the_probability_of_a_size_goes_with_the_size_of_a_probability(problem: Problem) -> None:
-    prediction, stack = of(problem), stacked(problem, 1)
-    for each in sizes_shown(prediction, stack, 0.01):
-        if np.isfinite(each.size):
-            same = power_of(prediction, stack, 0.01, each.kind, each.size)
-            own = next(one for one in same if one.joints == each.joints)
-            assert own.power == pytest.approx(0.95, abs=1e-6)
-
-
-def test_more_motions_show_smaller_effects_and_none_show_nothing(problem: Problem) -> None:
-    prediction = of(problem)
-    few, more = (sizes_shown(prediction, stacked(problem, *s), 0.01) for s in ((1,), (1, 2, 3)))
-    assert all(a.size > b.size for a, b in zip(few, more, strict=True))
-    none = sizes_shown(prediction, Stack.empty(problem.columns), 0.01)
-    assert all(each.size > 1e3 * one.size for each, one in zip(none, few, strict=True))
-
-
-def test_what_surprises_more_costs_more() -> None:
-    kinds = catalogue()
-    dear, cheap = kinds["spring"], kinds["viscous_friction"]
-    assert price(dear, 0.01) - price(cheap, 0.01) == pytest.approx(dear.prior_cost)
-    assert price(cheap, 0.01) > chi2.isf(0.01, 1)
 
 
 def test_kinds_that_are_rare_are_in_where_somebody_asks(problem: Problem) -> None:

@@ -18,6 +18,7 @@ from excite_cli.excitation.result import matches
 from excite_cli.robot.model import build_robot
 from excite_cli.store import result_file
 from excite_cli.store.result_file import read_result, write_result
+from tests.excitation.smoke import planned, smoke
 from tests.store.conftest import CONFIG, Stored
 
 
@@ -264,3 +265,17 @@ def test_others_may_read_the_file_as_any_other(stored: Stored, tmp_path: Path) -
     (tmp_path / "plain").write_text("", encoding="utf-8")
     write_result(tmp_path / "result.h5", stored.result, stored.problem)
     assert (tmp_path / "result.h5").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+def test_what_belongs_to_motions_for_the_work_is_read_again(tmp_path: Path) -> None:
+    problem = smoke("criterion.kind=predicted_torque", "optimizer.max_iterations=3")
+    result = planned(problem)
+    write_result(tmp_path / "work.h5", result, problem)
+    again = read_result(tmp_path / "work.h5")
+    assert result.stack.plain is not None
+    assert np.array_equal(again.stack.plain, result.stack.plain)
+    for one, other in zip(result.motions, again.motions, strict=True):
+        assert one.predicted_deviation == other.predicted_deviation
+        assert not other.doubt
+    last = problem.objective().own_condition_number(result.motions[-1].coefficients)
+    assert result.motions[-1].condition_number == pytest.approx(last)
