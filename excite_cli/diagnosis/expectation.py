@@ -6,11 +6,17 @@ The same figures whatever the motions were planned for, and with whatever weight
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from excite_cli.diagnosis.power import EffectPower, power_of, sizes_shown
+from excite_cli.excitation.objective import Objective
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.with_prediction import predicting
+from excite_cli.robot.model import Array
+
+_FINER = 10  # instants in the time of a sample
 
 
 @dataclass(frozen=True)
@@ -49,19 +55,37 @@ def expectation(
     assert prediction is not None
     same = own is start and earlier.factor.shape[1] == own.columns
     stack = earlier if same else Stack.empty(own.columns)
-    objective, deviations, stacks = own.objective(), [], [stack]
+    objective, deviations, fitted = own.objective(), [], stack
     for motion in result.motions:
-        stacks.append(objective.added_to(stacks[-1], motion.coefficients))
-        deviations.append(prediction.deviation(stacks[-1].factor))
-    stack = stacks[-2] if len(stacks) > 2 or (len(stacks) == 2 and earlier.rows) else stacks[-1]
+        stack = objective.added_to(stack, motion.coefficients)
+        deviations.append(prediction.deviation(stack.factor))
+    last = len(result.motions) > 1 or (earlier.rows > 0 and same)
+    for motion in result.motions[: len(result.motions) - last]:
+        fitted = fitted.with_rows(rows_as_recorded(own, objective, motion.coefficients))
     alpha = problem.spec.diagnosis.significance
     power = tuple(
         each
         for kind, size in asked.items()
-        for each in power_of(prediction, stack, alpha, kind, size)
+        for each in power_of(prediction, fitted, alpha, kind, size)
     )
     return Expectation(
         tuple(deviations),
-        power if asked else sizes_shown(prediction, stack, alpha),
+        power if asked else sizes_shown(prediction, fitted, alpha),
         same or not earlier.rows,
     )
+
+
+def rows_as_recorded(problem: Problem, objective: Objective, coefficients: Array) -> Array:
+    """Rows (N·R, c) of a motion as its recording has them, in units of the noise.
+
+    `task.rate` independent samples a second are means over as long: of a column that lasts for less
+    (Stribeck friction at a reversal) they show less.
+    """
+    rate, duration = problem.spec.task.rate, problem.trajectory.duration
+    count = max(1, int(rate * duration))
+    times: Array = np.arange(count * _FINER) / (rate * _FINER)
+    states = problem.trajectory.states(times, coefficients)
+    block = objective.block_of(times, *states)
+    means = block.reshape(count, _FINER, -1, block.shape[1]).mean(axis=1)
+    weight = np.sqrt(rate * duration / len(problem.cost_basis.times))
+    return np.asarray(means.reshape(-1, block.shape[1]) / weight)

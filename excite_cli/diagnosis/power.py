@@ -1,12 +1,14 @@
 """Which effects motions would show: before anything is measured.
 
-After motions with information M (`prediction.py`), all else being unknown as its prior says, the
-data alone know the size z of an effect (in units of its prior deviation) with
+A diagnosis tries an effect beside the base parameters and the declared effects. With G = CᵀC of the
+recordings (`prediction.py`), k these columns and p that of the effect, its size z (in units of its
+prior deviation) is known with
 
-    s⁻² = 1 / (M⁻¹)_zz − 1.
+    s⁻² = G_pp − G_pk (G_kk + P)⁻¹ G_kp.
 
-A diagnosis names it where it saves more χ² than its price c (`price`). With the true size z that
-χ² is noncentral, so that it is named with the power
+P is of the declared effects alone: inertias take all that they can explain. A diagnosis names it
+where it saves more χ² than its price c (`price`). With the true size z that χ² is noncentral, so
+that it is named with the power
 
     P(χ²₁(z²/s²) > c) = Φ(z/s − √c) + Φ(−z/s − √c),
 
@@ -15,7 +17,7 @@ of the motions. Nor does it name what its rules say is too small to matter (`lea
 surely it is there.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
@@ -31,7 +33,10 @@ SURE = 0.95
 # χ² of columns that are shifted in time exceeds that of chance by this factor: the median of the
 # placebos of real logs.
 _INFLATION = 1.5
-_FREE = 1e-3  # of the precision of inertias
+_RIDGE = 1e-9  # of what is known of every column
+# Share of an effect's energy below which the base parameters say it all: rounding.
+_NOTHING = 1e-6
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -79,25 +84,26 @@ def power_of(
         effect, scale, share = _about(prediction, at)
         if effect.kind == kind:
             chance = _chance(size / scale / deviation, price(type(effect), significance))
-            if share * size / scale < least_share(prediction, effect):
+            if share * size / scale < (1.0 - _ROUNDING) * least_share(prediction, effect):
                 chance = 0.0
             found.append(_record(prediction, effect, size, share * size / scale, chance))
     return tuple(found)
 
 
 def _deviations(prediction: Prediction, stack: Stack) -> np.ndarray:
-    """s of the first parameter of every effect, infinite where the motions say nothing of it.
-
-    A diagnosis takes from the inertias all that they can explain: their prior is next to none.
-    """
-    prior, rank = prediction.prior.copy(), prediction.rank
-    prior[:rank, :rank] *= _FREE
-    known = replace(prediction, prior=prior)
-    covariance = np.linalg.inv(known.information(stack.factor))
-    variance = np.diag(covariance)[prediction.first_columns]
-    informed = np.maximum(1.0 / variance - 1.0, 0.0)
+    """s of the first parameter of every effect, infinite where the motions say nothing of it."""
+    gram, rank = stack.factor.T @ stack.factor, prediction.rank
+    slices = prediction.extension.columns().slices[: prediction.declared]
+    kept = rank + (slices[-1].stop if slices else 0)
+    known = gram[:kept, :kept].copy()
+    known[rank:, rank:] += np.eye(kept - rank)
+    known[np.diag_indices(kept)] *= 1.0 + _RIDGE
+    at = prediction.first_columns
+    across, own = gram[:kept, at], gram[at, at]
+    informed = own - np.einsum("kp,kp->p", across, np.linalg.lstsq(known, across, rcond=None)[0])
+    informed[informed < _NOTHING * own] = 0.0
     with np.errstate(divide="ignore"):
-        return np.asarray(informed**-0.5)
+        return np.asarray(np.maximum(informed, 0.0) ** -0.5)
 
 
 def _shown(

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import chi2
 
 from excite_cli.diagnosis import rules
-from excite_cli.diagnosis.expectation import expectation
+from excite_cli.diagnosis.expectation import expectation, rows_as_recorded
 from excite_cli.diagnosis.power import least_share, power_of, price, sizes_shown, times_named
 from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.excitation.prediction import Prediction
@@ -34,7 +34,7 @@ def stacked(problem: Problem, *seeds: int) -> Stack:
 
 
 def test_an_effect_of_the_size_told_is_found_as_often_as_told(problem: Problem) -> None:
-    """By a likelihood ratio on drawn data, against the price; the other parameters are unknown."""
+    """By a likelihood ratio on drawn data, against the price; inertias are unknown."""
     prediction, rng = of(problem), np.random.default_rng(3)
     block = problem.objective().block(drawn(problem, 0.3, 1))
     stack = Stack.empty(problem.columns).with_rows(block)
@@ -43,16 +43,13 @@ def test_an_effect_of_the_size_told_is_found_as_often_as_told(problem: Problem) 
     column = int(prediction.first_columns[at])
     shown = sizes_shown(prediction, stack, 0.01, power=0.8)[at]
     size = shown.size / prediction.extension.scales[column - prediction.rank]
-    rest = np.delete(np.arange(problem.columns), column)
-    prior = prediction.prior
+    inertias = np.arange(prediction.rank)
     named = 0
     for _ in range(400):
-        z = np.linalg.solve(prior, rng.normal(size=len(prior)))
-        z[column] = size
-        rows = np.concatenate([block @ z + rng.normal(size=len(block)), np.zeros(len(prior))])
-        both = np.vstack([block, prior])
-        both[len(block) :, column] = 0.0
-        saved = _left(both[:, rest], rows) - _left(both, rows)
+        z = np.append(rng.normal(size=prediction.rank), size)
+        both = block[:, [*inertias, column]]
+        rows = both @ z + rng.normal(size=len(block))
+        saved = _left(both[:, :-1], rows) - _left(both, rows)
         named += saved > price(kind_named(kind), 0.01)
     assert named / 400 == pytest.approx(0.8, abs=0.06)
 
@@ -68,15 +65,17 @@ def test_the_probability_of_a_size_goes_with_the_size_of_a_probability(problem: 
         if np.isfinite(each.size):
             same = power_of(prediction, stack, 0.01, each.kind, each.size)
             own = next(one for one in same if one.joints == each.joints)
-            assert own.power == pytest.approx(0.95, abs=1e-6)
+            assert own.power > 0.95 - 1e-6
+            assert own.power < 0.95 + 1e-6 or own.share < 1.001 * max(rules.SMALLEST, 4e-3)
 
 
 def test_more_motions_show_smaller_effects_and_none_show_nothing(problem: Problem) -> None:
     prediction = of(problem)
     few, more = (sizes_shown(prediction, stacked(problem, *s), 0.01) for s in ((1,), (1, 2, 3)))
-    assert all(a.size > b.size for a, b in zip(few, more, strict=True))
+    assert all(a.size >= b.size for a, b in zip(few, more, strict=True))
+    assert sum(a.size > b.size for a, b in zip(few, more, strict=True)) > 20
     none = sizes_shown(prediction, Stack.empty(problem.columns), 0.01)
-    assert all(each.size > 1e3 * one.size for each, one in zip(none, few, strict=True))
+    assert all(np.isinf(each.size) for each in none)
 
 
 def test_what_surprises_more_costs_more() -> None:
@@ -128,6 +127,6 @@ def test_a_rotor_that_the_inertia_can_stand_for_is_not_shown() -> None:
 def test_the_last_of_several_motions_is_held_out(problem: Problem) -> None:
     two = planned(smoke(FOR_WORK, "sequence.motions=2", "optimizer.max_iterations=5"))
     found = expectation(problem, two)
-    alone = Stack.empty(problem.columns)
-    alone = problem.objective().added_to(alone, two.motions[0].coefficients)
+    rows = rows_as_recorded(problem, problem.objective(), two.motions[0].coefficients)
+    alone = Stack.empty(problem.columns).with_rows(rows)
     assert found.power == sizes_shown(of(problem), alone, problem.spec.diagnosis.significance)
