@@ -227,8 +227,11 @@ def information_of(traced: SearchResult, rivals: Sequence[Rival]) -> Information
 def _possible(traced: SearchResult, there: Collection[Place]) -> list[int]:
     """Of every kind that many robots have the first candidate at every place that is not `there`.
 
-    Those of the next motion that are planned for beside what was found.
+    Those of the next motion that are planned for beside what was found; none where a wrench at the
+    base is measured, since it is planned for the inertias alone.
     """
+    if traced.model.robot.base_joints:
+        return []
     found: dict[Place, int] = {}
     for i, each in enumerate(traced.candidates):
         if may_be_planned_for(type(each.effect), traced.model.robot) and not each.effect.runs:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import qr
 
 from excite_cli.config.data_spec import EffectSpec
-from excite_cli.config.spec import Spec
+from excite_cli.config.spec import CriterionSpec, Spec
 from excite_cli.criteria.catalogue import build_criterion
 from excite_cli.diagnosis.candidates import effect_of
 from excite_cli.diagnosis.records import Diagnosis, EffectRecord
@@ -127,10 +127,10 @@ def plan_after(
         The diagnosis belongs to another robot, or its numbers do not fit together.
     """
     robot = build_measured_robot(spec.robot, folder)
-    spec = _weighted(diagnosis, spec, robot)
+    asked, spec = spec.criterion, _weighted(diagnosis, spec, robot)
     if robot.base_joints:
         return _on_a_base(diagnosis, build_problem(spec, folder, fit, work, possible=()))
-    planned, said = [], []
+    planned, said = [], _reweighted(asked)
     for record in diagnosis.information.model:
         effect = effect_of(record, robot.joint_names)
         if why := why_not_planned(effect, robot):
@@ -167,6 +167,21 @@ def plan_after(
     beside += f" and {more} that it may have" if more > 0 else ""
     said.insert(0, f"{why}: the next motion excites the model{beside}, on top of the measured data")
     return NextMotion(problem, problem, prior, "excite", tuple(said), known)
+
+
+def _reweighted(asked: CriterionSpec) -> list[str]:
+    """What is not as the config's criterion asks for it."""
+    said = []
+    if asked.row_weights != "none":
+        said.append(
+            "criterion.row_weights is not used: measured data count in units of their own noise"
+        )
+    if not build_criterion(asked).of_work:
+        said.append(
+            "condition numbers are those of rows in units of the measured noise and of columns of "
+            "length 1, effects among them: not comparable with those of motions planned before"
+        )
+    return said
 
 
 def _of_work(spec: Spec) -> bool:
