@@ -1,12 +1,12 @@
 """Which effects motions would show: before anything is measured.
 
-A diagnosis tries an effect beside the base parameters and the declared effects. With G = CᵀC of the
-recordings (`prediction.py`), k these columns and p that of the effect, its size z (in units of its
-prior deviation) is known with
+A diagnosis tries an effect beside the base parameters, the declared effects, and the friction,
+offsets and rotors of a textbook on all joints. With G = CᵀC of the recordings (`prediction.py`), k
+these columns and p that of the effect, its size z (in units of its prior deviation) is known with
 
     s⁻² = G_pp − G_pk (G_kk + P)⁻¹ G_kp.
 
-P is of the declared effects alone: inertias take all that they can explain. A diagnosis names it
+P is of effects alone: inertias take all that they can explain. A diagnosis names it
 where it saves more χ² than its price c (`price`). With the true size z that χ² is noncentral, so
 that it is named with the power
 
@@ -33,6 +33,7 @@ SURE = 0.95
 # χ² of columns that are shifted in time exceeds that of chance by this factor: the median of the
 # placebos of real logs.
 _INFLATION = 1.5
+_TEXTBOOK = (*EVERYDAY_FRICTION, *EVERYDAY)
 _RIDGE = 1e-9  # of what is known of every column
 # Share of an effect's energy below which the base parameters say it all: rounding.
 _NOTHING = 1e-6
@@ -92,18 +93,27 @@ def power_of(
 
 def _deviations(prediction: Prediction, stack: Stack) -> np.ndarray:
     """s of the first parameter of every effect, infinite where the motions say nothing of it."""
-    gram, rank = stack.factor.T @ stack.factor, prediction.rank
-    slices = prediction.extension.columns().slices[: prediction.declared]
-    kept = rank + (slices[-1].stop if slices else 0)
-    known = gram[:kept, :kept].copy()
-    known[rank:, rank:] += np.eye(kept - rank)
-    known[np.diag_indices(kept)] *= 1.0 + _RIDGE
-    at = prediction.first_columns
-    across, own = gram[:kept, at], gram[at, at]
-    informed = own - np.einsum("kp,kp->p", across, np.linalg.lstsq(known, across, rcond=None)[0])
-    informed[informed < _NOTHING * own] = 0.0
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.maximum(informed, 0.0) ** -0.5)
+    extension, rank = prediction.extension, prediction.rank
+    kept = np.arange(rank)
+    for at, (effect, own) in enumerate(
+        zip(extension.effects, extension.columns().slices, strict=True)
+    ):
+        if at < prediction.declared or effect.kind in _TEXTBOOK:
+            kept = np.append(kept, rank + np.arange(own.start, own.stop))
+    gram = stack.factor.T @ stack.factor
+    known = gram + np.diag(np.where(np.arange(len(gram)) < rank, 0.0, 1.0))
+    known[np.diag_indices(rank)] *= 1.0 + _RIDGE
+    beside = known[np.ix_(kept, kept)]
+    size = np.sqrt(np.maximum(np.diag(beside), 1e-300))
+    inverse = np.linalg.pinv(beside / np.outer(size, size), hermitian=True) / np.outer(size, size)
+    variances = dict(zip(kept.tolist(), np.diag(inverse).tolist(), strict=True))
+    found = []
+    for p in prediction.first_columns.tolist():
+        own = gram[p, p]
+        across = gram[kept, p]
+        informed = 1.0 / variances[p] - 1.0 if p in variances else own - across @ inverse @ across
+        found.append(informed**-0.5 if informed > _NOTHING * own else np.inf)
+    return np.array(found)
 
 
 def _shown(
@@ -121,7 +131,7 @@ def least_share(prediction: Prediction, effect: Effect) -> float:
 
     What every robot has must also make an error of its joint noticeably larger, or matter.
     """
-    if effect.kind not in {*EVERYDAY_FRICTION, *EVERYDAY}:
+    if effect.kind not in _TEXTBOOK:
         return rules.SMALLEST
     robot = prediction.extension.robot
     rows = {int(row): k for k, row in enumerate(robot.rows)}

@@ -262,7 +262,10 @@ def _in_words(result: Result) -> str:
     words = f"{count} motion{'s' * (count != 1)} of {joints} joints"
     if not result.motions:
         return words
-    return f"{words}, stacked condition number {result.motions[-1].stacked_condition_number:.2f}"
+    last = result.motions[-1]
+    if last.predicted_deviation is not None:
+        return f"{words}, predicted torques to {last.predicted_deviation:.2f} of a sample's noise"
+    return f"{words}, stacked condition number {last.stacked_condition_number:.2f}"
 
 
 def _tables(motions: Sequence[Motion]) -> Parts:

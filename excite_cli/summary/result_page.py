@@ -5,6 +5,7 @@ import numpy as np
 from excite_cli.diagnosis.words import counted
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.random_baseline import RandomMotion
 from excite_cli.excitation.result import Result
 from excite_cli.geometry.reasons import reason_in_words
 from excite_cli.report.chart import in_figures
@@ -72,15 +73,14 @@ def condition_section(result: Result, problem: Problem, picture: bool = True) ->
 
 
 def result_figures(result: Result, problem: Problem) -> list[KeyFigure]:
-    """Condition number after all motions, the random motions', how many, and what is proved."""
-    last, count = (
-        result.motions[-1].stacked_condition_number,
-        counted(len(result.motions), "motion"),
-    )
+    """What is best after all motions, the random motions', how many, and what is proved."""
+    last, count = _figure(result.motions[-1]), counted(len(result.motions), "motion")
     prior = ", on earlier data" if result.priors else ""
-    found = [KeyFigure("condition number", in_figures(last), f"after {count}{prior}")]
+    for_work = result.motions[-1].predicted_deviation is not None
+    name = "predicted torques, in noise of a sample" if for_work else "condition number"
+    found = [KeyFigure(name, in_figures(last), f"after {count}{prior}")]
     if result.random:
-        random = result.random[-1].stacked_condition_number
+        random = _figure(result.random[-1])
         worse = f"{in_figures(random / last)} times worse"
         found.append(KeyFigure("best random motions", in_figures(random), worse))
     seconds = in_figures(sum(motion.seconds for motion in result.motions))
@@ -92,18 +92,26 @@ def result_figures(result: Result, problem: Problem) -> list[KeyFigure]:
     return [*found, *kept]
 
 
+def _figure(motion: Motion | RandomMotion) -> float:
+    """Predicted deviation where motions are planned for that, else the stacked condition number."""
+    deviation = motion.predicted_deviation
+    return motion.stacked_condition_number if deviation is None else deviation
+
+
 def condition_words(result: Result) -> str:
     """The finding in one or two sentences."""
-    numbers = [motion.stacked_condition_number for motion in result.motions]
+    numbers = [_figure(motion) for motion in result.motions]
     steps = " → ".join(in_figures(number) for number in numbers)
     prior = f" on top of {counted(len(result.priors), 'earlier file')}" if result.priors else ""
-    if len(numbers) == 1:
+    if result.motions and result.motions[-1].predicted_deviation is not None:
+        words = f"Torques of the work are predicted to {steps} of the noise of a sample{prior}."
+    elif len(numbers) == 1:
         words = f"The motion gives a condition number of {steps}{prior}."
     else:
         words = f"Stacked motion by motion{prior}, the condition number goes {steps}."
     if result.random:
         drawn, admissible = result.random_candidates
-        random = result.random[-1].stacked_condition_number
+        random = _figure(result.random[-1])
         words += (
             f" The best of {admissible} admissible random motions ({drawn} drawn), stacked the "
             f"same way, reach {in_figures(random)}: {in_figures(random / numbers[-1])} times worse."
@@ -114,7 +122,9 @@ def condition_words(result: Result) -> str:
 def _weighting_words(result: Result, problem: Problem) -> str:
     """What the numbers are relative to, where it is not the plain regressor of the paper."""
     weighting, effects = problem.weighting, result.effect_names
-    parts = []
+    parts: list[str] = []
+    if problem.prediction is not None:  # condition numbers are those of the plain regressor
+        return ""
     if weighting.row_name != "none":
         parts.append(f"rows weighted ({weighting.row_name.replace('_', ' ')})")
     if weighting.column_name != "none":

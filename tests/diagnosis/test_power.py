@@ -34,7 +34,7 @@ def stacked(problem: Problem, *seeds: int) -> Stack:
 
 
 def test_an_effect_of_the_size_told_is_found_as_often_as_told(problem: Problem) -> None:
-    """By a likelihood ratio on drawn data, against the price; inertias are unknown."""
+    """By a likelihood ratio on drawn data, against the price, beside inertias and a textbook."""
     prediction, rng = of(problem), np.random.default_rng(3)
     block = problem.objective().block(drawn(problem, 0.3, 1))
     stack = Stack.empty(problem.columns).with_rows(block)
@@ -43,12 +43,20 @@ def test_an_effect_of_the_size_told_is_found_as_often_as_told(problem: Problem) 
     column = int(prediction.first_columns[at])
     shown = sizes_shown(prediction, stack, 0.01, power=0.8)[at]
     size = shown.size / prediction.extension.scales[column - prediction.rank]
-    inertias = np.arange(prediction.rank)
+    textbook = ("viscous_friction", "coulomb_friction", "torque_offset", "armature")
+    friction = [
+        int(first)
+        for first, each in zip(prediction.first_columns, prediction.extension.effects, strict=True)
+        if each.kind in textbook
+    ]
+    beside = [*range(prediction.rank), *friction]
+    prior = np.eye(len(beside) + 1)[prediction.rank : -1]
+    both = np.vstack([block[:, [*beside, column]], prior])
     named = 0
     for _ in range(400):
-        z = np.append(rng.normal(size=prediction.rank), size)
-        both = block[:, [*inertias, column]]
-        rows = both @ z + rng.normal(size=len(block))
+        z = np.append(rng.normal(size=len(beside)), size)
+        rows = block[:, [*beside, column]] @ z + rng.normal(size=len(block))
+        rows = np.append(rows, np.zeros(len(prior)))
         saved = _left(both[:, :-1], rows) - _left(both, rows)
         named += saved > price(kind_named(kind), 0.01)
     assert named / 400 == pytest.approx(0.8, abs=0.06)
