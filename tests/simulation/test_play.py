@@ -11,6 +11,7 @@ from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.effects.viscous_friction import ViscousFriction
 from excite_cli.errors import ConfigError, MissingExtraError, RobotError
 from excite_cli.measurement.run_identity import RunId
+from excite_cli.robot.effort_curve import EffortCurve
 from excite_cli.robot.model import Robot
 from excite_cli.simulation.build import Build, make
 from excite_cli.simulation.ground_truth import plant
@@ -136,8 +137,9 @@ def test_declared_effects_are_there_in_plausible_sizes(robot: Robot) -> None:
 def test_motors_stop_at_their_limits_if_asked(robot: Robot) -> None:
     free = played(robot).dataset.runs[0]
     level = 0.8 * np.abs(free.tau[:, ELBOW]).max()
-    limits = replace(robot.limits, effort=np.full(robot.n, np.inf))
-    limits.effort[ELBOW] = level
+    curves = [EffortCurve.constant(np.inf)] * robot.n
+    curves[ELBOW] = EffortCurve.constant(level)
+    limits = replace(robot.limits, curves=tuple(curves))
     weak = replace(robot, limits=limits)
     run = played(weak, torque_limits=True).dataset.runs[0]
     assert np.abs(run.tau[:, ELBOW]).max() <= level + 1e-9
