@@ -71,9 +71,12 @@ def test_a_worker_that_outlives_its_run_does_not_keep_the_claim(tmp_path: Path) 
 
     def run() -> None:
         claim(path)
+        ready, running = os.pipe()
         worker = os.fork()
         if not worker:
+            os.write(running, b".")
             signal.pause()
+        os.read(ready, 1)  # it has let go of what it was born with
         workers.write_text(str(worker))
 
     other = Other(run)
