@@ -10,6 +10,7 @@ import pytest
 from excite_cli.api.diagnosing import diagnose
 from excite_cli.api.identifying import identify
 from excite_cli.api.loading import Case
+from excite_cli.api.planning import plan_after
 from excite_cli.config.load_spec import load_spec
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.effects.catalogue import kind_named
@@ -66,6 +67,19 @@ def dry_friction(found: Diagnosis) -> tuple[float, float]:
 def test_a_robot_with_one_moved_joint() -> None:
     found = diagnose(case("robot.joints=[elbow]"), recorded("elbow"))
     assert dry_friction(found)[0] == pytest.approx(3.0, rel=0.1)
+
+
+def test_what_was_tested_and_not_found_is_kept_for_the_next_motion() -> None:
+    own = case("robot.joints=[elbow]", "criterion.kind=predicted_torque")
+    found = diagnose(own, recorded("elbow"))
+    about = found.information
+    kinds = {each.kind for each in about.possible}
+    assert kinds == {"viscous_friction"}
+    columns = about.rank + len((*about.model, *about.rivals, *about.possible))
+    assert about.factor.shape == (columns, columns)
+    planned = plan_after(own, found, tell=lambda note: None)
+    assert "coulomb_friction" in {each.kind for each in planned.problem.extension.effects}
+    assert kinds <= {each.kind for each in planned.problem.extension.effects}
 
 
 def test_stale_messages_change_neither_names_nor_sizes() -> None:

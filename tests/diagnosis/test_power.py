@@ -8,10 +8,10 @@ from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.expectation import expectation, rows_as_recorded
 from excite_cli.diagnosis.power import least_share, power_of, price, sizes_shown, times_named
 from excite_cli.effects.catalogue import catalogue, kind_named
-from excite_cli.excitation.prediction import Prediction
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.stack import Stack
-from tests.excitation.smoke import drawn, planned, smoke
+from tests.excitation.smoke import drawn, planned, smoke, stacked
+from tests.excitation.smoke import prediction_of as of
 
 FOR_WORK = "criterion.kind=predicted_torque"
 
@@ -19,18 +19,6 @@ FOR_WORK = "criterion.kind=predicted_torque"
 @pytest.fixture(scope="module")
 def problem() -> Problem:
     return smoke(FOR_WORK)
-
-
-def of(problem: Problem) -> Prediction:
-    assert problem.prediction is not None
-    return problem.prediction
-
-
-def stacked(problem: Problem, *seeds: int) -> Stack:
-    objective, stack = problem.objective(), Stack.empty(problem.columns)
-    for seed in seeds:
-        stack = objective.added_to(stack, drawn(problem, 0.3, seed))
-    return stack
 
 
 def test_an_effect_of_the_size_told_is_found_as_often_as_told(problem: Problem) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from excite_cli.api.loading import load_problem
 from excite_cli.excitation.motion import Motion
+from excite_cli.excitation.prediction import Prediction
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.run import continue_run, new_result
@@ -31,6 +32,19 @@ def drawn(problem: Problem, size: float, seed: int = 3) -> Array:
     """Random coefficients."""
     shape = (problem.trajectory.n_coefficients, problem.robot.n)
     return size * np.random.default_rng(seed).normal(size=shape)
+
+
+def prediction_of(problem: Problem) -> Prediction:
+    assert problem.prediction is not None
+    return problem.prediction
+
+
+def stacked(problem: Problem, *seeds: int) -> Stack:
+    """Of random motions."""
+    objective, stack = problem.objective(), Stack.empty(problem.columns)
+    for seed in seeds:
+        stack = objective.added_to(stack, drawn(problem, 0.3, seed))
+    return stack
 
 
 def one_motion(problem: Problem) -> Motion:

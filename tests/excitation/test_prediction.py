@@ -9,11 +9,12 @@ from excite_cli.diagnosis.expectation import expectation
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.gradient_check import check_gradient
 from excite_cli.excitation.not_modelled import not_modelled
-from excite_cli.excitation.prediction import PredictedTorques, Prediction
+from excite_cli.excitation.prediction import PredictedTorques
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.with_prediction import predicting
-from tests.excitation.smoke import drawn, planned, smoke
+from tests.excitation.smoke import drawn, planned, smoke, stacked
+from tests.excitation.smoke import prediction_of as of
 
 FOR_WORK = "criterion.kind=predicted_torque"
 
@@ -21,18 +22,6 @@ FOR_WORK = "criterion.kind=predicted_torque"
 @pytest.fixture(scope="module")
 def problem() -> Problem:
     return smoke(FOR_WORK)
-
-
-def of(problem: Problem) -> Prediction:
-    assert problem.prediction is not None
-    return problem.prediction
-
-
-def stacked(problem: Problem, *seeds: int) -> Stack:
-    objective, stack = problem.objective(), Stack.empty(problem.columns)
-    for seed in seeds:
-        stack = stack.with_rows(objective.block(drawn(problem, 0.3, seed)))
-    return stack
 
 
 def test_the_gradient_is_that_of_differences(problem: Problem) -> None:
