@@ -13,6 +13,7 @@ from excite_cli.api.loading import (
     robot_base,
     sources_of,
     tell_findings,
+    with_drive_law,
 )
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_text_atomically
@@ -81,7 +82,7 @@ def diagnose(
     problem = measured_case(problem)
     inputs = inputs_of(problem, *sources_of(data))
     with held({"output": output, "apply": apply}, overwrite, inputs), at_hand(workers):
-        dataset = dataset_of(problem, data, tell)
+        problem, dataset = with_drive_law(problem, dataset_of(problem, data, tell), held_out, tell)
         found = diagnose_dataset(
             problem.robot, robot_base(problem), dataset, problem.spec, held_out, progress, ended
         )

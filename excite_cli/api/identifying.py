@@ -13,6 +13,7 @@ from excite_cli.api.loading import (
     robot_base,
     sources_of,
     tell_findings,
+    with_drive_law,
 )
 from excite_cli.api.models import write_models
 from excite_cli.api.outputs import held
@@ -71,7 +72,7 @@ def identify(
     models = {"urdf": urdf, "mjcf": mjcf, "parameters": parameters}
     inputs = inputs_of(problem, *sources_of(data))
     with held({"output": output, **models}, overwrite, inputs), at_hand(workers):
-        dataset = dataset_of(problem, data, tell)
+        problem, dataset = with_drive_law(problem, dataset_of(problem, data, tell), held_out, tell)
         suspicious = check_dataset(problem.robot, dataset, problem.spec, held_out)
         dataset = replace(dataset, findings=(*dataset.findings, *suspicious))
         tell_findings(suspicious, tell)

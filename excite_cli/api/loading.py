@@ -21,11 +21,14 @@ from excite_cli.errors import FileError
 from excite_cli.excitation.admissible import worst_margins
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.result import Result, matches
+from excite_cli.identification.drive_law import find_law, is_sought, with_law
+from excite_cli.identification.split import split
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.covariates import with_declared
 from excite_cli.measurement.dataset import Dataset, Finding, merged
 from excite_cli.measurement.motors import motors_of
 from excite_cli.measurement.quality import raise_for_errors
+from excite_cli.measurement.torque_sources.command import law_of
 from excite_cli.robot.description import is_named
 from excite_cli.robot.model import Array, Robot, build_measured_robot, build_robot
 from excite_cli.robot.overview import describe
@@ -379,6 +382,29 @@ def dataset_of(
                 "fills and masks such samples in files; take them out of data of your own."
             )
     return with_declared(data, problem.spec.measurement.covariates)
+
+
+def with_drive_law(
+    problem: Problem | Case, data: Dataset, held_out: str | None, tell: Tell
+) -> tuple[Problem | Case, Dataset]:
+    """What the config leaves open of the drives' law found in the data, but for the held-out part.
+
+    Raises
+    ------
+    FileError
+        A gain cannot be found.
+    """
+    if not is_sought(problem.spec.measurement):
+        return problem, data
+    spec, robot = problem.spec, problem.robot
+    training = split(data, held_out, spec.diagnosis.block, spec.identification.needed_runs).training
+    found = find_law(robot, robot_base(problem), training, spec)
+    joints = robot.joint_names[robot.base_joints :]
+    findings = found.findings(joints)
+    tell_findings(findings, tell)
+    data = with_law(data, law_of(spec.measurement, joints), found.law)
+    data = replace(data, findings=(*data.findings, *findings))
+    return replace(problem, spec=found.told(spec, joints)), data
 
 
 def tell_findings(findings: Iterable[Finding], tell: Tell) -> None:

@@ -13,7 +13,7 @@ from excite_cli.checks.setup import Setup
 from excite_cli.checks.setup_check import Alternative, Settings, SetupCheck, descended
 from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
 from excite_cli.config.spec import Spec
-from excite_cli.measurement.torque import NEWTON_METERS, torque_units
+from excite_cli.measurement.torque_sources.recorded import NEWTON_METERS, torque_units
 
 _FACTOR = 6.0
 _TRIED = 10.0 ** np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0])

@@ -67,6 +67,8 @@ def with_preset(values: dict[str, Any]) -> dict[str, Any]:
 
 
 EffectKind = Annotated[str, Field(json_schema_extra={"x-family": "effects"})]
+TorqueSourceName = Annotated[str, Field(json_schema_extra={"x-family": "torque_sources"})]
+ChannelName = Literal["t", "q", "dq", "tau", "q_cmd", "v_cmd", "tau_ff", "voltage", "duty"]
 CheckName = Annotated[str, Field(json_schema_extra={"x-family": "checks"})]
 RunStates = dict[EffectKind, str]  # `none`: without it
 
@@ -113,6 +115,36 @@ class FilterSpec(Section):
     )
 
 
+class DriveLawSpec(Section):
+    """The law of drives that follow position set points, kp (q* - q) + kd (v* - v) + tau_ff.
+
+    For `torque: command`.
+    """
+
+    kp: PerJoint | None = Field(
+        None, description="[N·m/rad] at the joint; default: found in the data, by the URDF's masses"
+    )
+    kd: PerJoint = Field(
+        0.0, description="[N·m·s/rad] at the joint; what is not told stays in viscous friction"
+    )
+    delay: NonNegative | None = Field(
+        None, description="[s] after which a set point acts; default: found in the data"
+    )
+    limit: PerJoint | None = Field(None, description="[N·m] at which the drive's torque stops")
+
+
+class MotorSpec(Section):
+    """The motor that a voltage turns, for `torque: voltage` and `torque: duty`."""
+
+    resistance: PerJoint = Field(1.0, description="[Ω]")
+    back_emf: PerJoint | None = Field(
+        None, description="[V·s/rad] of the motor's speed; default: torque_constant"
+    )
+    supply: Positive | str = Field(
+        1.0, description="[V] that a duty cycle of 1 puts on the motor, or the column that holds it"
+    )
+
+
 class MeasurementSpec(Section):
     """What the recorded columns are."""
 
@@ -127,10 +159,14 @@ class MeasurementSpec(Section):
     preset: Literal["ur_rtde", "ur_ros2", "franka", "kuka_rsi", "unitree", "dynamixel"] | None = (
         Field(None, description="a recorder whose names and units are known; other keys go before")
     )
-    torque: Literal["link", "motor", "current"] = Field(
+    torque: TorqueSourceName = Field(
         "link",
-        description="link: at the joint; motor: before the gear; current: before motor and gear",
+        description="link: at the joint; motor: before the gear; current: before motor and gear; "
+        "command: what the drive makes of position set points (columns q_cmd_<joint>); voltage, "
+        "duty: what the motor makes of them",
     )
+    command: DriveLawSpec = DriveLawSpec()
+    motor: MotorSpec = MotorSpec()
     gravity: Literal["included", "subtracted"] = Field(
         "included",
         description="subtracted: from the torque, by a controller; that of the URDF is added again",
@@ -138,7 +174,8 @@ class MeasurementSpec(Section):
     gear_ratio: PerJoint = Field(1.0, description="motor turns per turn of the joint, with sign")
     torque_constant: PerJoint = Field(
         1.0,
-        description="[N·m/A] at the motor, for torque: current; of another unit, N·m in one of it",
+        description="[N·m/A] at the motor, for torque: current, voltage and duty; of another unit, "
+        "N·m in one of it",
     )
     coupling: dict[str, dict[str, Finite]] = Field(
         default_factory=dict,
@@ -185,7 +222,7 @@ class MeasurementSpec(Section):
     rate: Positive | None = Field(
         None, description="[Hz] sampling rate of files that have no column t"
     )
-    channels: dict[Literal["t", "q", "dq", "tau"], str | None] = Field(
+    channels: dict[ChannelName, str | None] = Field(
         default_factory=dict,
         description="names of channels in the file, as {tau: current}; {dq: null} leaves it out",
     )

@@ -29,6 +29,7 @@ from excite_cli.effects.rare_sizes import half_of
 from excite_cli.errors import ConfigError
 from excite_cli.identification.link_changes import SIX_AT, about_frame, slopes
 from excite_cli.measurement.dataset import Finding
+from excite_cli.measurement.torque_sources.catalogue import torque_source
 from excite_cli.robot.link_frame import link_frame, own_link
 from excite_cli.robot.model import Array, Robot
 
@@ -134,9 +135,9 @@ def total_mass_row(robot: Robot, base: BaseParameters) -> Array:
 def assumed_scale(measurement: MeasurementSpec, spec: IdentificationSpec) -> list[Finding]:
     """That what is found has the scale of constants that somebody gave, if nothing tells it."""
     told = (spec.known_payload, spec.total_mass, spec.gain_std)
-    if any(each is not None for each in told) or measurement.torque == "link":
+    of = torque_source(measurement).scaled_by
+    if any(each is not None for each in told) or not of:
         return []
-    of = "torque_constant and gear_ratio" if measurement.torque == "current" else "gear_ratio"
     text = (
         f"masses, friction and loads have the scale of measurement.{of} as given, and their ± know "
         "nothing of its error. A payload of known mass on a run determines it "

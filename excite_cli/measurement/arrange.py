@@ -12,7 +12,10 @@ from excite_cli.measurement.dataset import Array, Finding, Run
 from excite_cli.measurement.reader import CHANNELS, RawRun
 
 _LISTED, _LONGEST = 40, 60  # names that are reported; characters of each
-_CHANNEL_WORDS = {"q": "position", "tau": "torque", "dq": "speed"}
+_CHANNEL_WORDS = {
+    "q": "position", "tau": "torque", "dq": "speed", "q_cmd": "position set point",
+    "voltage": "voltage", "duty": "duty cycle",
+}  # fmt: skip
 
 
 def check_names(names: Mapping[str, str], joints: Sequence[str], key: str = "names") -> None:
@@ -35,16 +38,19 @@ def arrange(
     source: str,
     without_torque: Sequence[str] = (),
     torque_names: Mapping[str, str] = MappingProxyType({}),
+    beside: Sequence[str] = ("tau",),
 ) -> tuple[Run, list[Finding]]:
     """The run with columns in the order of `joints`; what belongs to no moved joint is `extra`.
 
     No torque of joints `without_torque` is valid: it is 0, whether it was recorded or not.
-    `torque_names` go before `names` where torques are concerned.
+    `torque_names` go before `names` where torques are concerned. Channels `beside` the positions
+    are needed of all joints; without torques among them, these are 0.
 
     Raises
     ------
     FileError
-        A joint of the robot is missing, or numbered columns are not as many as joints.
+        A joint of the robot is missing in a channel that is needed, or numbered columns are not
+        as many as joints.
     """
     findings = [replace(found, run=raw.name) for found in raw.findings]
     positions = list(raw.columns["q"])
@@ -59,22 +65,23 @@ def arrange(
     for channel, columns in raw.columns.items():
         own = {**names, **torque_names} if channel == "tau" else names
         by_joint = {own.get(column, column): values for column, values in columns.items()}
-        if channel == "tau":
+        if channel in ("tau", *beside):
             by_joint.update(_none(without_torque, raw))
         missing = [joint for joint in joints if joint not in by_joint]
         if not missing:
             matrices[channel] = np.column_stack([by_joint[joint] for joint in joints])
-        elif channel in ("q", "tau"):
+        elif channel in ("q", *beside):
             raise FileError(_missing(source, raw.name, channel, missing, list(columns)))
         elif channel == "dq":
             text = f"speed of {', '.join(missing)} is missing; recorded speeds are not used"
             findings.append(Finding("no_speed", "note", text, raw.name, tuple(missing)))
         left = [j for j in by_joint if j not in joints or missing]
         extra.update({f"{channel}_{joint}": by_joint[joint] for joint in left})
-    if "tau" not in matrices and set(without_torque) >= set(joints):
-        matrices["tau"] = np.zeros((len(raw.t), len(joints)))
-    if "tau" not in matrices:
-        raise FileError(_missing(source, raw.name, "tau", list(joints), []))
+    lacking = [channel for channel in beside if channel not in matrices]
+    if lacking and not set(without_torque) >= set(joints):
+        raise FileError(_missing(source, raw.name, lacking[0], list(joints), []))
+    for channel in ("tau", *lacking):
+        matrices.setdefault(channel, np.zeros((len(raw.t), len(joints))))
     others = sorted({names.get(column, column) for column in positions} - set(joints))
     if others:
         text = f"joints that the robot does not move, kept as further channels: {listed(others)}"
@@ -124,9 +131,15 @@ def _missing(source: str, run: str, channel: str, missing: list[str], columns: l
     where = f"{source}, run {run}" if run else source
     rest = f" (nor of {', '.join(missing[1:])})" if len(missing) > 1 else ""
     moves = f", or, if it moved, measurement.without_torque: [{', '.join(missing)}]"
+    if not columns:
+        return (
+            f"{where}: there is no {_CHANNEL_WORDS.get(channel, channel)} of any joint: no columns "
+            f"'{channel}_<joint>'. A channel of another name: measurement.channels: "
+            f"{{{channel}: …}}; where torques come from: measurement.torque."
+        )
     return (
-        f"{where}: there is no {_CHANNEL_WORDS[channel]} of joint '{joint}'{rest}."
+        f"{where}: there is no {_CHANNEL_WORDS.get(channel, channel)} of joint '{joint}'{rest}."
         f"{nearest(joint, columns, 0.5)} The file names: {listed(columns)}. Say "
         f"which is which: measurement.names: {{<name in the file>: {joint}}}, or leave the joint "
-        f"out of robot.joints{moves if channel == 'tau' else ''}."
+        f"out of robot.joints{moves if channel != 'q' else ''}."
     )

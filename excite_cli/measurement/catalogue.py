@@ -21,6 +21,7 @@ from excite_cli.measurement.reader import SINCE_1970, RawRun, Reader, ReadOption
 from excite_cli.measurement.recording_limits import RecordingLimits
 from excite_cli.measurement.run_identity import Origin
 from excite_cli.measurement.torque import SECONDS, check_joints, check_motors, declared, to_joints
+from excite_cli.measurement.torque_sources.catalogue import torque_source
 from excite_cli.out_of_core import Spool
 from excite_cli.registry import Registry
 from excite_cli.workers.base import Tell
@@ -76,7 +77,7 @@ def read_dataset(
     places = joint_names if motors is None else (*joint_names, *motors.places)
     check_names(spec.names, places)
     check_names(spec.torque_names, places, "torque_names")
-    torques = "joints" in rows
+    source, torques = torque_source(spec), "joints" in rows
     if not torques:
         spec = spec.model_copy(update={"without_torque": joint_names, "coupling": {}})
     check_joints(spec, joint_names, torques)
@@ -90,7 +91,8 @@ def read_dataset(
     )
     channels: dict[str, str | None] = {str(key): name for key, name in spec.channels.items()}
     options = ReadOptions(
-        joint_names, spec.names, channels, spec.rate, spec.topic, torques,
+        joint_names, spec.names, channels, spec.rate, spec.topic,
+        source.channels if torques else (),
         channels_of_base(spec) if "base" in rows else (),
     )  # fmt: skip
     findings: list[Finding] = declared(spec, joint_names, motors)
@@ -107,8 +109,9 @@ def read_dataset(
             for raw in _named(raws, path, taken):
                 raw = raw if motors is None else motors.renamed(raw, spec)
                 run, more = arrange(
-                    raw, joint_names, spec.names, str(path), spec.without_torque, spec.torque_names
-                )
+                    raw, joint_names, spec.names, str(path), spec.without_torque,
+                    spec.torque_names, options.beside,
+                )  # fmt: skip
                 t, epoch = _seconds(raw, spec)
                 run = replace(run, t=t, epoch=epoch, origin=Origin(str(path), raw.place))
                 run = covariates.take(run, raw, spec.names)

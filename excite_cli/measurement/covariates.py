@@ -14,12 +14,12 @@ from excite_cli.errors import ConfigError, FileError, nearest
 from excite_cli.measurement.arrange import listed
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
 from excite_cli.measurement.missing_values import filled_between, known_values
-from excite_cli.measurement.reader import CHANNELS, RawRun
+from excite_cli.measurement.reader import CHANNELS, SENT, RawRun
 from excite_cli.measurement.stretches import longest
 
 _KEY = "measurement.covariates"
 _LONG = 10.0  # s without a value: a motor's winding may have warmed up by then
-_OUR_OWN = ("q_ref", "valid")  # channels that are known to be something else
+_OUR_OWN = ("q_ref", "valid", *SENT)  # channels that are known to be something else
 
 
 def further_columns(raw: RawRun, names: Mapping[str, str]) -> dict[str, Array]:

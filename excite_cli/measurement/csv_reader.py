@@ -14,6 +14,7 @@ from excite_cli.measurement.dataset import Array, Finding
 from excite_cli.measurement.reader import (
     CHANNELS,
     FIELDS,
+    SENT,
     RawRun,
     Reader,
     ReadOptions,
@@ -129,7 +130,7 @@ def run_of_table(path: Path, table: NamedColumns, wanted: ReadOptions) -> RawRun
     words, samples = listed(list(columns)), len(next(iter(columns.values())))
     apart = {name: columns.pop(name) for name in [*columns] if wanted.is_apart(name)}
     wanted = _by_fields(columns, wanted)
-    of_joints = any((w := wanted.called(c)) and _joints(columns, w) for c in CHANNELS)
+    of_joints = any((w := wanted.called(c)) and _joints(columns, w) for c in (*CHANNELS, *SENT))
     if not of_joints and not apart:
         raise FileError(_no_columns(path, "q", wanted, words))
     time = wanted.called("t")
@@ -203,7 +204,7 @@ def _by_channel(
     """Columns sorted into channel -> joint; what ends in no joint's name stands apart."""
     channels: dict[str, dict[str, Array]] = {"q": {}}
     others: dict[str, Array] = {}
-    called = {name: wanted.called(name) for name in CHANNELS}
+    called = {name: wanted.called(name) for name in (*CHANNELS, *SENT)}
     # Longer names first, so that `tau_q_…` or `dq_…` are not taken for another channel.
     ranked = sorted(called.items(), key=lambda c: -len(c[1] or ""))
     places: dict[str, tuple[str, str]] = {}

@@ -17,7 +17,10 @@ from excite_cli.measurement.arrange import listed
 from excite_cli.measurement.dataset import Array
 from excite_cli.measurement.reader import RawRun, ReadOptions
 
-_WORDS = {"q": "positions", "tau": "torques"}  # without which nothing can be said
+_WORDS = {  # without which nothing can be said
+    "q": "positions", "tau": "torques", "q_cmd": "position set points", "voltage": "voltages",
+    "duty": "duty cycles",
+}  # fmt: skip
 
 
 def is_part(raw: RawRun, wanted: ReadOptions) -> bool:
@@ -73,7 +76,7 @@ def _joined(parts: Sequence[tuple[Path, RawRun]], wanted: ReadOptions) -> RawRun
         findings = (*whole.findings, *raw.findings)
         whole = replace(whole, columns=columns, others=others, findings=findings)
     for channel in wanted.needed:
-        word = _WORDS[channel]
+        word = _WORDS.get(channel, channel)
         if not whole.columns.get(channel):
             there = [f"{name}_<joint>" for name, by_joint in whole.columns.items() if by_joint]
             raise FileError(

@@ -160,7 +160,7 @@ class JointStates:
             elif sizes == {0}:
                 raise FileError(
                     f"{path}: messages of topic {self.topic} carry no {field}; needed: "
-                    f"{' and '.join(FIELDS[each] for each in wanted.needed)}. Record a driver that "
+                    f"{' and '.join(FIELDS.get(each, each) for each in wanted.needed)}. Record a driver that "
                     "publishes them."
                 )
             else:

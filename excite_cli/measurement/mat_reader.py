@@ -14,6 +14,7 @@ from excite_cli.measurement.foreign_hdf5 import attribute, kept_inside, member, 
 from excite_cli.measurement.memory_limit import limited_memory
 from excite_cli.measurement.reader import (
     CHANNELS,
+    SENT,
     RawRun,
     Reader,
     ReadOptions,
@@ -94,7 +95,11 @@ class MatReader(Reader):
         words = listed([*held])
         time = wanted.called("t")
         stamped = time is not None and time in held
-        found = {name: held[called] for name in CHANNELS if (called := wanted.called(name)) in held}
+        found = {
+            name: held[called]
+            for name in (*CHANNELS, *SENT)
+            if (called := wanted.called(name)) in held
+        }
         missing = [name for name in wanted.needed if name not in found]
         if missing:
             raise FileError(

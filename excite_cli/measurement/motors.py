@@ -19,6 +19,7 @@ from excite_cli.config.robot_spec import JointLimits, TransmissionSpec
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.measurement.dataset import Array, Run
 from excite_cli.measurement.reader import RawRun
+from excite_cli.measurement.torque_sources.catalogue import torque_source
 
 _SINGULAR = 1e8
 
@@ -141,7 +142,7 @@ def at_motors(channel: str, spec: MeasurementSpec) -> bool:
     """Whether a channel is recorded at the motors; whether samples count goes with the torque."""
     if channel in ("q", "dq"):
         return spec.position == "motor"
-    return spec.torque in ("motor", "current")
+    return torque_source(spec).at_motor
 
 
 def _combined(x: Array, matrix: Array) -> Array:

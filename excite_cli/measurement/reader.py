@@ -25,6 +25,7 @@ MAX_BYTES = 4 * 2**30  # of a file
 MAX_VALUES = 2**28  # numbers taken from a file: 2 GiB in memory
 ALWAYS, PACKED = 2**27, 50  # bytes that any file may unpack to; times its size
 CHANNELS = ("q", "dq", "tau")
+SENT = ("q_cmd", "v_cmd", "tau_ff", "voltage", "duty")  # what drives were sent, a column per joint
 FIELDS = {"q": "position", "dq": "velocity", "tau": "effort"}  # of JointState
 SINCE_1970 = 1e9  # s: no clock that counts from its own start has come so far
 
@@ -35,9 +36,9 @@ class ReadOptions:
 
     `channels`: the file's name of t, q, dq, tau where it differs; None leaves a channel out.
     `rate` [Hz] of files without time stamps; `topic` of a bag; `joints` the robot's names with
-    `names` (file's name -> joint), for readers that must choose between sources. Without `torques`
-    a file need not hold any. Channels `apart` belong to no joint, whatever they are called and
-    however many columns they have; without them nothing can be said either.
+    `names` (file's name -> joint), for readers that must choose between sources. `beside` the
+    positions these channels are needed. Channels `apart` belong to no joint, whatever they are
+    called and however many columns they have; without them nothing can be said either.
     """
 
     joints: tuple[str, ...]
@@ -45,13 +46,13 @@ class ReadOptions:
     channels: Mapping[str, str | None] = field(default_factory=dict)
     rate: float | None = None
     topic: str | None = None
-    torques: bool = True
+    beside: tuple[str, ...] = ("tau",)
     apart: tuple[BaseChannel, ...] = ()
 
     @property
     def needed(self) -> tuple[str, ...]:
         """Channels without which nothing can be said."""
-        return ("q", "tau") if self.torques else ("q",)
+        return ("q", *self.beside)
 
     def is_apart(self, column: str) -> bool:
         """Whether a column or array of that name belongs to no joint."""

@@ -1,7 +1,7 @@
 """From what was recorded to what is meant: s, rad (m), and N·m at the joint.
 
-With m the torque of the motors (recorded, or current times the motor's constant), g the gear
-ratios and S the shares of a coupled transmission (`coupling`),
+With m the torque of the motors (`torque_sources`), g the gear ratios and S the shares of a coupled
+transmission (`coupling`),
 
     tau = (I + S) diag(g) m        and, by virtual work,        q_motor = diag(g) (I + S)ᵀ q.
 
@@ -11,6 +11,7 @@ signs are those of the motors that stand in a joint's place, and `motors` goes o
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -18,11 +19,12 @@ from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
 from excite_cli.measurement.motors import Motors, at_motors
+from excite_cli.measurement.torque_sources.base import per_joint
+from excite_cli.measurement.torque_sources.catalogue import torque_source
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 RADIANS = {"rad": 1.0, "deg": np.pi / 180}
 METERS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
-NEWTON_METERS = {"Nm": 1.0, "mNm": 1e-3, "Ncm": 1e-2, "kNm": 1e3, "kgfcm": 0.0980665}
 
 
 def check_motors(spec: MeasurementSpec, motors: Motors) -> None:
@@ -86,7 +88,7 @@ def check_joints(spec: MeasurementSpec, joints: tuple[str, ...], torques: bool =
                 f"measurement.coupling: a part of the torque of {joint} is that of {unknown[0]}, "
                 f"which measurement.without_torque leaves out. Name {joint} there, too."
             )
-    ratios = _per_joint(spec.gear_ratio, joints)
+    ratios = per_joint(spec.gear_ratio, joints)
     if not ratios.all():
         raise ConfigError("measurement.gear_ratio: a ratio of 0 means nothing.")
     if abs(np.linalg.det(np.eye(len(joints)) + _shares(spec, joints))) < 1e-9:
@@ -101,27 +103,34 @@ def to_joints(
     motors: Motors | None = None,
 ) -> Run:
     """The run in s, rad (m) and N·m at the joints, as `spec` declares it."""
-    ratio, shares = _per_joint(spec.gear_ratio, joints), _shares(spec, joints)
+    ratio, shares = per_joint(spec.gear_ratio, joints), _shares(spec, joints)
     angle = np.where(revolute, angle_units(spec, joints), METERS[spec.length])
-    q = run.q * angle * _per_joint(spec.position_sign, joints)
-    dq = None if run.dq is None else run.dq * angle * _per_joint(spec.velocity_sign, joints)
-    if spec.position == "motor":
-        back = np.linalg.inv(np.eye(len(joints)) + shares.T).T
-        q = q / ratio @ back
-        dq = None if dq is None else dq / ratio @ back
-        if motors is not None:
-            q = motors.positions(q)
-            dq = None if dq is None else motors.positions(dq)
-    q = q + _per_joint(spec.offset, joints, 0.0)
-    tau = run.tau * _per_joint(spec.sign, joints) * torque_units(spec, joints)
-    if spec.torque == "current":
-        tau = tau * _per_joint(spec.torque_constant, joints)
-    if spec.torque in ("motor", "current"):
+    back = np.linalg.inv(np.eye(len(joints)) + shares.T).T
+
+    def at_joints(x: Array, sign: dict[str, Any]) -> Array:
+        x = x * angle * per_joint(sign, joints)
+        if spec.position == "motor":
+            x = x / ratio @ back
+            x = x if motors is None else motors.positions(x)
+        return x
+
+    offset = per_joint(spec.offset, joints, 0.0)
+    q = at_joints(run.q, spec.position_sign) + offset
+    dq = None if run.dq is None else at_joints(run.dq, spec.velocity_sign)
+    extra, source = dict(run.extra), torque_source(spec)
+    if "q_cmd" in source.channels:
+        extra["q_cmd"] = at_joints(extra["q_cmd"], spec.position_sign) + offset
+        if "v_cmd" in extra:
+            extra["v_cmd"] = at_joints(extra["v_cmd"], spec.velocity_sign)
+    run = replace(run, q=q, dq=dq, extra=extra)
+    tau = source.torque(run, spec, joints)
+    tau[:, [joint in spec.without_torque for joint in joints]] = 0.0
+    if source.at_motor:
         tau = tau * ratio
     coupled = tau.copy()
     for j, k in np.argwhere(shares):  # not a product with S: 0 · NaN would spread over all joints
         coupled[:, j] += shares[j, k] * tau[:, k]
-    converted = replace(run, q=q, dq=dq, tau=coupled)
+    converted = replace(run, tau=coupled)
     return converted if motors is None else motors.at_joints(converted, spec)
 
 
@@ -130,12 +139,6 @@ def angle_units(spec: MeasurementSpec, joints: tuple[str, ...]) -> Array:
     declared = spec.angle
     units = [declared.get(j, "rad") if isinstance(declared, Mapping) else declared for j in joints]
     return np.array([RADIANS[unit] if isinstance(unit, str) else unit for unit in units])
-
-
-def torque_units(spec: MeasurementSpec, joints: tuple[str, ...]) -> Array:
-    """N·m (N) in one unit of the file, (n,)."""
-    unit = spec.torque_unit
-    return _per_joint(NEWTON_METERS[unit] if isinstance(unit, str) else unit, joints)
 
 
 def in_step(run: Run, lag: float) -> Run:
@@ -156,31 +159,28 @@ def declared(
     if spec.preset is not None:
         text = f"read as {spec.preset} writes it (measurement.preset)"
         findings.append(Finding("preset", "note", text))
-    ratio = _per_joint(spec.gear_ratio, joints)
+    ratio = per_joint(spec.gear_ratio, joints)
     if spec.torque == "motor" and (ratio == 1.0).all() and motors is None:
         text = (
             "measurement.torque is 'motor', and every gear_ratio is 1: give "
             "measurement.gear_ratio unless the motors drive the joints directly"
         )
         findings.append(Finding("no_ratio", "warning", text))
-    if spec.torque == "link" and spec.position == "link" and (ratio != 1.0).any():
+    at_motor = torque_source(spec).at_motor
+    if not at_motor and spec.position == "link" and (ratio != 1.0).any():
         text = (
-            "measurement.gear_ratio is given but not applied, for the torque is at the link; "
+            "measurement.gear_ratio is given but not applied, for the torque is at the joint; "
             "write measurement.torque: motor if it is not"
         )
         findings.append(Finding("ratio_not_applied", "warning", text))
-    if spec.torque != "current" and (_per_joint(spec.torque_constant, joints) != 1.0).any():
-        text = "measurement.torque_constant is given but not applied: torque is not 'current'"
+    unused = spec.torque not in ("current", "voltage", "duty")
+    if unused and (per_joint(spec.torque_constant, joints) != 1.0).any():
+        text = (
+            "measurement.torque_constant is given but not applied: torque is none of 'current', "
+            "'voltage', 'duty'"
+        )
         findings.append(Finding("constant_not_applied", "warning", text))
     return findings
-
-
-def _per_joint(
-    value: float | Mapping[str, float], joints: tuple[str, ...], other: float = 1.0
-) -> Array:
-    if isinstance(value, Mapping):
-        return np.array([float(value.get(joint, other)) for joint in joints])
-    return np.full(len(joints), float(value))
 
 
 def _shares(spec: MeasurementSpec, joints: tuple[str, ...]) -> Array:

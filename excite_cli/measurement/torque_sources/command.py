@@ -1,0 +1,76 @@
+"""Robots without torque sensors: what the position controller of their drives applies.
+
+    τ(t) = kp (q*(t − d) − q(t)) + kd (v*(t − d) − v(t)) + τ_ff(t − d),    |τ| ≤ limit
+
+with set points q* (speeds v* and torques τ_ff, where the drive takes any) that act the time d after
+they were recorded, and gains kp [N·m/rad], kd [N·m·s/rad] at the joint. A set point stands until
+the next one comes; what a joint feels over a sample is its average, which is q* interpolated half a
+sample later.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.config.data_spec import MeasurementSpec
+from excite_cli.measurement.dataset import Array, Run
+from excite_cli.measurement.torque_sources.base import TorqueSource, per_joint, speeds_of
+
+# [N·m/rad] for drives whose gain nobody told, until it is found in the data.
+UNKNOWN_GAIN = 1.0
+
+
+@dataclass(frozen=True)
+class DriveLaw:
+    """`kp` [N·m/rad], `kd` [N·m·s/rad], `limit` [N·m] (∞ without one), each (n,); `delay` [s]."""
+
+    kp: Array
+    kd: Array
+    limit: Array
+    delay: float
+
+    def torque(self, run: Run) -> Array:
+        """τ (T, n) [N·m] that the drives apply in a run with set points in its `extra`."""
+        late = held(run, self.delay)
+        tau = self.kp * (late["q_cmd"] - run.q)
+        tau += self.kd * (late.get("v_cmd", 0.0) - speeds_of(run))
+        tau += late.get("tau_ff", 0.0)
+        return np.clip(tau, -self.limit, self.limit)
+
+
+def held(run: Run, delay: float) -> Mapping[str, Array]:
+    """What drives act upon `delay` [s] after it was sent: those of q*, v*, τ_ff (T, n) there are."""
+    step = run.step if len(run.t) > 1 else 0.0
+    at = run.t - delay - 0.5 * step
+    found = {}
+    for name in (*Command.channels, *Command.further):
+        if name in run.extra:
+            columns = [np.interp(at, run.t, column) for column in run.extra[name].T]
+            found[name] = np.stack(columns, axis=1)
+    return found
+
+
+def law_of(spec: MeasurementSpec, joints: tuple[str, ...]) -> DriveLaw:
+    """The law that a config tells of; what it leaves to the data is 1 N·m/rad and no delay."""
+    told = spec.command
+    return DriveLaw(
+        per_joint(told.kp, joints, UNKNOWN_GAIN),
+        per_joint(told.kd, joints, 0.0),
+        per_joint(told.limit, joints, np.inf),
+        told.delay or 0.0,
+    )
+
+
+class Command(TorqueSource):
+    """Position set points, and what the drive makes of them."""
+
+    name = "command"
+    title = "of the drive's law, from position set points"
+    channels = ("q_cmd",)
+    further = ("v_cmd", "tau_ff")
+    scaled_by = "command.kp"
+
+    def torque(self, run: Run, spec: MeasurementSpec, joints: tuple[str, ...]) -> Array:
+        """By the law of `measurement.command`."""
+        return law_of(spec, joints).torque(run)
