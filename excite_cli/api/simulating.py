@@ -23,6 +23,8 @@ from excite_cli.simulation.covariate_series import parse_series as parse_series
 from excite_cli.simulation.ground_truth import parse_planted
 from excite_cli.simulation.mujoco_model import load_mujoco
 from excite_cli.simulation.planned_motion import Planned, PlannedMotion, PlannedProgram
+from excite_cli.simulation.position_drive import PositionDrive as PositionDrive
+from excite_cli.simulation.position_drive import parse_gains as parse_gains
 from excite_cli.simulation.settings import SimulationSettings as SimulationSettings
 from excite_cli.simulation.simulate import Simulation, takes_of
 from excite_cli.simulation.simulate import simulate as simulate_motions
@@ -32,6 +34,7 @@ from excite_cli.trajectory.fade import Segment
 
 # What of the config's measurement section changes neither positions nor torques when it is read.
 _KEPT = {"filter", "topic", "rate", "covariates", "wrench", "base"}
+_FAR = 0.2  # rad (m): a joint this far from its set point does not follow it
 
 
 @checked("motions")
@@ -84,7 +87,7 @@ def simulate(
         planted = [each for text in effects for each in parse_planted(text, robot, takes)]
         own = declared_effects(problem.spec.effects, whole) if declared else ()
         if output is not None:
-            _warn_of_conversion(problem.spec.measurement, tell)
+            _warn_of_reading(problem.spec.measurement, settings, tell)
         found = simulate_motions(
             robot,
             planned,
@@ -94,6 +97,7 @@ def simulate(
             Instruments(problem.spec.measurement, settings) if robot.base_joints else None,
             lambda run, done: progress(run, done, sum(map(len, takes.values()))),
         )
+        _hint_at_lag(found, tell)
         if output is not None:
             write_dataset(Path(output), found.dataset, _attributes(problem, found, settings))
         return found
@@ -123,19 +127,47 @@ def _planned(
     return list(programs), replace(settings, periods=1)
 
 
-def _warn_of_conversion(measurement: MeasurementSpec, tell: Tell) -> None:
-    """Reading the file with this config would change positions or torques."""
-    plain = MeasurementSpec()
+def _warn_of_reading(
+    measurement: MeasurementSpec, settings: SimulationSettings, tell: Tell
+) -> None:
+    """Reading the file with this config would change positions or torques, or find none."""
+    plain, by_command = MeasurementSpec(), getattr(measurement, "torque", "") == "command"
+    own = {"torque", "command"} if settings.drive is not None else set()
     if any(
         getattr(measurement, name) != getattr(plain, name)
         for name in MeasurementSpec.model_fields
-        if name not in _KEPT
+        if name not in _KEPT | own
     ):
         text = (
             "the config converts recorded positions or torques (measurement: …), but this file "
             "holds rad and N·m at the joints. Read it with a config without that."
         )
         tell(Note(Level.WARNING, text))
+    if by_command != (settings.drive is not None):
+        text = (
+            "this file holds set points (q_cmd) and no torques: read it with a config that has "
+            "measurement.torque: command, and the drive's gains in measurement.command."
+            if settings.drive is not None
+            else "the config takes torques from set points (measurement.torque: command), but "
+            "this file holds torques: simulate with --control position, or read it without that."
+        )
+        tell(Note(Level.NOTE, text))
+
+
+def _hint_at_lag(found: Simulation, tell: Tell) -> None:
+    """A robot that is far from its set points does not move as planned."""
+    if not found.lag:
+        return
+    run, joint, error = found.farthest
+    if error > _FAR:
+        name = found.dataset.joint_names[joint]
+        unit = "m" if found.truth.sliding[joint] else "rad"
+        text = (
+            f"'{name}' is up to {error:.2g} {unit} from its set points: what moves is not the "
+            "planned motion, whose limits and clearances are not kept. Take larger --kp, or plan "
+            "a slower motion."
+        )
+        tell(Note(Level.HINT, text, run))
 
 
 def _attributes(

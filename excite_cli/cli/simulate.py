@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from excite_cli.cli import options
+from excite_cli.cli import drive, options
 from excite_cli.cli.completion import complete_effect
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
@@ -162,6 +162,12 @@ def simulate(
             help="Motors saturate at the robot's effort limits.",
         ),
     ] = False,
+    control: drive.ControlOption = drive.Control.TRACKING,
+    kp: drive.Kp = None,
+    kd: drive.Kd = None,
+    command_rate: drive.CommandRate = None,
+    command_delay: drive.CommandDelay = None,
+    set_point_speeds: drive.SetPointSpeeds = False,
     seed: options.Seed = None,
     overrides: options.Set = None,
     overwrite: options.Overwrite = False,
@@ -177,6 +183,10 @@ def simulate(
     ground truth is stored in the file's attribute `truth`. With --entry the robot starts and ends
     at rest, and entry and return keep all constraints of the config.
 
+    With --control position the drives follow set points, τ = kp (q* - q) + kd (v* - v), and the
+    log holds t, q, q_cmd (v_cmd) and no torque, as of quadrupeds and servos; gains and delay are
+    in `truth`. Motions are planned as ever: what the drives cannot follow, the robot does not do.
+
     Examples:
       excite simulate ur10.yaml ur10.h5 -o measured.h5 \\
           --effect load_dependent_friction@elbow_joint=0.06
@@ -187,6 +197,8 @@ def simulate(
       excite simulate ur10.yaml ur10.h5 -o warm.h5 --repeat 4 --pause 300 \\
           --covariate temp=25,end:45,time_constant:600,noise:0.2 \\
           --effect 'covariate_friction@elbow_joint=-0.1,reference:25;covariate:temp'
+      excite simulate ur10.yaml ur10.h5 -o servo.h5 --control position --kp 2000 --kd 100 \\
+          --kp wrist_3_joint=200 --kd wrist_3_joint=5 --command-rate 50 --command-delay 0.01
     """
     from excite_cli.api.loading import load_case
     from excite_cli.api.simulating import SimulationSettings, parse_series, simulation_answer
@@ -210,6 +222,15 @@ def simulate(
             pause=pause,
             torque_limits=torque_limits,
             covariates=parse_series(covariate or ()),
+            drive=drive.drive_asked_for(
+                control,
+                case.robot.joint_names,
+                kp,
+                kd,
+                command_rate,
+                command_delay,
+                set_point_speeds,
+            ),
             **base_noise(case.spec, wrench_noise, imu_noise),
         )
         with terminal.live("simulating") as line:

@@ -1,4 +1,4 @@
-"""Data sets as HDF5 in the layout that the reader takes: `/runs/<name>/{t, q, tau[, dq]}`."""
+"""Data sets as HDF5 in the layout that the reader takes: `/runs/<name>/{t, q[, tau][, dq]}`."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -37,7 +37,8 @@ def new_hdf5(path: Path) -> Iterator[Any]:
 def write_dataset(path: Path, dataset: Dataset, attributes: Mapping[str, Any]) -> None:
     """Write `dataset` whole or not at all; `attributes` (numbers, texts, lists) go to the root.
 
-    Units are s, rad, rad/s and N·m at the joint: read again with `measurement: {torque: link}`.
+    Units are s, rad, rad/s and N·m at the joint: read again with `measurement: {torque: link}`. Of
+    robots that measure no torque (all NaN) there is none.
 
     Raises
     ------
@@ -61,7 +62,7 @@ def _write_run(group: Any, run: Run) -> None:
         group.attrs["epoch"] = run.epoch
     arrays = {"t": run.t, "q": run.q, "dq": run.dq, "tau": run.tau, "valid": run.valid}
     for name, array in arrays.items():
-        if array is not None:
+        if array is not None and not (name == "tau" and np.isnan(array).all()):
             group[name] = array
     for name, array in run.extra.items():
         if name not in arrays:

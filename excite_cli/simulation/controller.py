@@ -9,6 +9,7 @@ wrist with much friction would stand still at every reversal for longer than rea
 """
 
 from dataclasses import dataclass, replace
+from typing import ClassVar, Protocol
 
 import numpy as np
 from scipy.linalg import eigh
@@ -20,6 +21,20 @@ from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.build import Build, mass_matrices, sudden_inertias
 from excite_cli.simulation.mujoco_model import Plant
 from excite_cli.simulation.planned_motion import Planned
+
+
+class Controller(Protocol):
+    """What gives the torque of a run's motors, control step by control step.
+
+    `advice` to whoever's robot ran away; it may name the control {rate} [Hz].
+    """
+
+    advice: ClassVar[str]
+
+    def torque(self, k: int, q: Array, v: Array) -> Array:
+        """Torque (n,) from control step `k` to the next, in the state q, v (n,)."""
+        ...
+
 
 _MASS_EVERY = 10  # control steps
 _FASTEST = 0.4  # share of the control rate that the quickest motion may be damped at
@@ -51,6 +66,36 @@ class Gains:
     integral: float
     mass: Array
     every: int
+
+
+class TrackingControl:
+    """The controller of this module's text on one run: a `Controller` with an integral.
+
+    `clip` (n,): what the motors can give.
+    """
+
+    advice: ClassVar = "Take smaller effects, or a slower controller."
+
+    def __init__(self, reference: Reference, gains: Gains, clip: Array) -> None:
+        self._reference, self._gains = reference, gains
+        self._clip = clip if np.isfinite(clip).any() else None
+        self._period = float(reference.t[1] - reference.t[0])
+        self._integral = np.zeros(reference.q.shape[1])
+
+    def torque(self, k: int, q: Array, v: Array) -> Array:
+        """As `Controller.torque`."""
+        reference, gains = self._reference, self._gains
+        error = reference.q[k] - q
+        wanted = gains.position * error + gains.integral * self._integral
+        wanted += gains.speed * (reference.v[k] - v)
+        torque = reference.feed_forward[k] + gains.mass[k // gains.every] @ wanted
+        error *= self._period
+        if self._clip is not None:
+            limited = np.clip(torque, -self._clip, self._clip)
+            error *= limited == torque  # the integral waits while a motor is at its limit
+            torque = limited
+        self._integral += error
+        return np.asarray(torque)
 
 
 def reference_of(robot: Robot, motion: Planned, t: Array) -> Reference:

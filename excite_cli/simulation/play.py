@@ -11,7 +11,7 @@ from excite_cli.effects.base import Effect, Signals
 from excite_cli.errors import RobotError
 from excite_cli.robot.model import Array
 from excite_cli.simulation.build import Build
-from excite_cli.simulation.controller import Gains, Reference
+from excite_cli.simulation.controller import Controller, Reference
 from excite_cli.simulation.ground_truth import PlantedEffect
 from excite_cli.simulation.mujoco_model import Plant, load_mujoco
 
@@ -97,8 +97,8 @@ class MotorRecord:
     step: float
 
 
-def play(build: Build, plant: Plant, reference: Reference, gains: Gains) -> MotorRecord:
-    """Let the robot follow the reference, from rest relative to it.
+def play(build: Build, plant: Plant, reference: Reference, controller: Controller) -> MotorRecord:
+    """Let the controller lead the robot along the reference, from rest relative to it.
 
     Raises
     ------
@@ -124,21 +124,10 @@ def play(build: Build, plant: Plant, reference: Reference, gains: Gains) -> Moto
     period = float(reference.t[1] - reference.t[0])
     substeps = round(period / model.opt.timestep)
     q, v, tau = np.empty((3, rows, n))
-    integral = np.zeros(n)
-    clip = build.clip if np.isfinite(build.clip).any() else None
     for k in range(rows):
         qk, vk = q[k], v[k]
         qk[:], vk[:] = qpos[motor], qvel[motor]
-        error = reference.q[k] - qk
-        wanted = gains.position * error + gains.integral * integral
-        wanted += gains.speed * (reference.v[k] - vk)
-        torque = reference.feed_forward[k] + gains.mass[k // gains.every] @ wanted
-        error *= period
-        if clip is not None:
-            limited = np.clip(torque, -clip, clip)
-            error *= limited == torque  # the integral waits while a motor is at its limit
-            torque = limited
-        integral += error
+        torque = controller.torque(k, qk, vk)
         tau[k] = torque
         if effects is not None:
             torque = torque - effects.at(reference.t[k] + 0.5 * period, qk, vk, 0.5 * period)
@@ -149,7 +138,7 @@ def play(build: Build, plant: Plant, reference: Reference, gains: Gains) -> Moto
             pushing.at(reference.t[k])
         applied[motor] = torque
         mujoco.mj_step(model, data, substeps)
-    _check(build, reference, q)
+    _check(build, reference, q, controller.advice)
     return MotorRecord(reference.t, q, v, tau, float(model.opt.timestep))
 
 
@@ -219,13 +208,14 @@ class _Pushing:
             external[:3], external[3:] = force, np.cross(lever, force)
 
 
-def _check(build: Build, reference: Reference, q: Array) -> None:
+def _check(build: Build, reference: Reference, q: Array, advice: str) -> None:
     away = ~np.isfinite(q) | (np.abs(q - reference.q) > _RUNAWAY)
     if not away.any():
         return
     k = int(np.argmax(away.any(axis=1)))
     joint = build.robot.joint_names[int(np.argmax(away[k]))]
+    rate = 1.0 / float(reference.t[1] - reference.t[0])
     raise RobotError(
         f"run '{build.run.key}': the simulated robot ran away at {reference.t[k]:.3f} s, first "
-        f"joint '{joint}'. Take smaller effects, or a slower controller."
+        f"joint '{joint}'. {advice.format(rate=rate)}"
     )

@@ -7,6 +7,7 @@ import numpy as np
 
 from excite_cli.errors import ConfigError
 from excite_cli.simulation.covariate_series import CovariateSeries
+from excite_cli.simulation.position_drive import PositionDrive
 
 MOST_REPEATED = 10_000
 _MOST_SAMPLES = 20_000_000
@@ -48,6 +49,7 @@ class SimulationSettings:
     moment_noise: float = 0.5
     acceleration_noise: float = 0.02
     rate_noise: float = 1e-3
+    drive: PositionDrive | None = None
 
     @property
     def physics_step(self) -> float:
@@ -97,6 +99,11 @@ class SimulationSettings:
                     f"{name}: {getattr(self, name)} cannot be played; allowed: 1 to "
                     f"{MOST_REPEATED:,}."
                 )
+        if self.drive is not None and self.drive.command_rate > self.control_rate:
+            raise ConfigError(
+                f"--command-rate {self.drive.command_rate:g}: allowed: up to the drive's own rate, "
+                f"{self.control_rate:g} Hz."
+            )
         for name in ("step", "bandwidth", "lead_in", "control_rate"):
             if not getattr(self, name) > 0.0:
                 raise ConfigError(f"{name.replace('_', ' ')}: it must be positive.")

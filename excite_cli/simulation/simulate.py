@@ -4,6 +4,7 @@ import hashlib
 import shlex
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,15 +22,17 @@ from excite_cli.simulation.base_sensors import Instruments
 from excite_cli.simulation.build import Build, assemble, make, true_inertias
 from excite_cli.simulation.controller import (
     Reference,
+    TrackingControl,
     compensated,
     control_instants,
     gains_of,
     reference_of,
 )
 from excite_cli.simulation.ground_truth import PlantedEffect, sized
-from excite_cli.simulation.mujoco_model import silent_engine
+from excite_cli.simulation.mujoco_model import Plant, silent_engine
 from excite_cli.simulation.planned_motion import Planned
 from excite_cli.simulation.play import MotorRecord, play
+from excite_cli.simulation.set_point_control import SetPointControl
 from excite_cli.simulation.settings import SimulationSettings
 
 # From what happened to what is recorded: encoder counts, drive speeds, noisy torques.
@@ -134,29 +137,44 @@ _FIRST_DAY = 1.7e9  # s from 1970: when a simulated campaign with pauses begins
 class Truth:
     """What the simulated robot is: inertias φ (10·n_bodies,) and all its effects.
 
-    `joint_names` (n,) and which of them slide (n,).
+    `joint_names` (n,) and which of them slide (n,). `drive`: the law of a drive that follows set
+    points, as plain data; None where a controller of torques led the robot.
     """
 
     phi: Array = field(repr=False)
     effects: tuple[PlantedEffect, ...]
     joint_names: tuple[str, ...]
     sliding: NDArray[np.bool_]
+    drive: dict[str, Any] | None = None
 
     def record(self) -> dict[str, object]:
         """As plain data."""
         return {
             "effects": [each.record(self.joint_names, self.sliding) for each in self.effects],
             "phi": self.phi.tolist(),
+            **({} if self.drive is None else {"drive": self.drive}),
         }
 
 
 @dataclass(frozen=True, repr=False)
 class Simulation(Shown):
-    """Recorded runs, the truth behind them, and each run's RMS tracking error (n,) [rad; m]."""
+    """Recorded runs, the truth behind them, and each run's RMS tracking error (n,) [rad; m].
+
+    `lag`: of a robot that follows set points, the largest distance (n,) [rad; m] to the newest
+    one in each run. Such a robot measures no torque: those of its runs are NaN.
+    """
 
     dataset: Dataset
     truth: Truth
     tracking: dict[str, Array]
+    lag: dict[str, Array] = field(default_factory=dict)
+
+    @property
+    def farthest(self) -> tuple[str, int, float]:
+        """Run, joint (its place) and size of the largest `lag` [rad; m]."""
+        run = max(self.lag, key=lambda name: float(self.lag[name].max()))
+        joint = int(np.argmax(self.lag[run]))
+        return run, joint, float(self.lag[run][joint])
 
 
 def takes_of(motions: Sequence[Planned], repeat: int) -> dict[str, tuple[str, ...]]:
@@ -188,6 +206,11 @@ def simulate(
     """
     if settings.periods > 1 and not all(motion.periodic for motion in motions):
         raise ConfigError("periods: only periodic motions (family: fourier) can go on.")
+    if settings.drive is not None and robot.base_joints:
+        raise ConfigError(
+            "--control position: only robots on a fixed base are simulated so. Leave robot.base "
+            "out of the config, or --control position."
+        )
     settings.require_room(motion.duration for motion in motions)
     phi = true_inertias(robot, settings.inertia_error, settings.seed)
     for effect in (*declared, *(each.effect for each in effects)):
@@ -207,7 +230,13 @@ def simulate(
                 tracking[run.name] = error
                 start = _next_start(run, settings)
     dataset = Dataset(robot.joint_names[robot.base_joints :], tuple(runs), ("simulated",))
-    return Simulation(dataset, Truth(phi, planted, robot.joint_names, robot.sliding), tracking)
+    drive, lag = None, {}
+    if settings.drive is not None:
+        limit = robot.limits.effort if settings.torque_limits else None
+        drive = settings.drive.record(robot.joint_names, limit)
+        lag = {run.name: np.abs(run.extra["q_cmd"] - run.q).max(axis=0) for run in runs}
+    truth = Truth(phi, planted, robot.joint_names, robot.sliding, drive)
+    return Simulation(dataset, truth, tracking, lag)
 
 
 def _dated(effect: Effect) -> bool:
@@ -257,9 +286,7 @@ def _takes(
         active = (*present, start if dated else 0.0)
         if active not in played:
             plant = make(build, settings.physics_step)
-            gains = gains_of(build, plant, reference, settings.bandwidth)
-            followed = compensated(build, reference, settings.compensation)
-            played[active] = play(build, plant, followed, gains)
+            played[active] = _played(build, plant, motion, reference, settings)
         # Noise of its own for every run and motion, in this file and in others of the same robot.
         numbers = [settings.seed, 2, _number(name.encode()), _number(motion.number)]
         rng = np.random.default_rng(numbers)
@@ -267,11 +294,27 @@ def _takes(
         if instruments is not None:
             run = instruments.logged(robot, run, build.gravity, rng)
         epoch = _FIRST_DAY + start if settings.pause else None
-        extra = {"q_ref": motion.states(run.t)[0]}
+        if settings.drive is None:
+            extra = {"q_ref": motion.states(run.t)[0]}
+        else:  # such robots report positions alone
+            run = replace(run, tau=np.full_like(run.tau, np.nan), dq=None)
+            extra = settings.drive.recorded(motion, run.t)
         extra |= {s.name: s.recorded(start + run.t, rng) for s in settings.covariates}
         run = replace(run, extra={**run.extra, **extra}, start=start, epoch=epoch)
         start = _next_start(run, settings)
         yield run, _tracking_error(reference, played[active], duration)[robot.base_joints :]
+
+
+def _played(
+    build: Build, plant: Plant, motion: Planned, reference: Reference, settings: SimulationSettings
+) -> MotorRecord:
+    """One motion, led by a drive that follows set points or by the controller of torques."""
+    if settings.drive is not None:
+        drive = SetPointControl(settings.drive, build, motion, reference.t, settings.encoder)
+        return play(build, plant, reference, drive)
+    gains = gains_of(build, plant, reference, settings.bandwidth)
+    followed = compensated(build, reference, settings.compensation)
+    return play(build, plant, followed, TrackingControl(followed, gains, build.clip))
 
 
 def _next_start(run: Run, settings: SimulationSettings) -> float:

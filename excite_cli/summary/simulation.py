@@ -1,10 +1,12 @@
 """Simulated runs and what was put into the robot, as tables and as data."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from excite_cli.fields import data_of
+from excite_cli.robot.model import Array
 from excite_cli.scoring.records import Replay
 from excite_cli.shown.answer import Answer, Parts, Table
 from excite_cli.shown.record import show
@@ -72,8 +74,11 @@ def simulation_answer(found: Simulation, output: str, seed: int) -> Answer:
                 "name": run.name,
                 "samples": len(run.t),
                 "duration": run.duration,
-                "tracking_error": dict(
-                    zip(joints, map(float, found.tracking[run.name]), strict=True)
+                "tracking_error": _named(joints, found.tracking[run.name]),
+                **(
+                    {"largest_error": _named(joints, found.lag[run.name])}
+                    if run.name in found.lag
+                    else {}
                 ),
             }
             for run in found.dataset.runs
@@ -88,7 +93,20 @@ def simulation_answer(found: Simulation, output: str, seed: int) -> Answer:
 def simulation_parts(found: Simulation) -> Parts:
     """The runs, and the effects in the robot."""
     records = _records(found)
-    return [_run_table(found), *([_effect_table(records)] if records else [])]
+    lag = [_lag_in_words(found)] if found.lag else []
+    return [_run_table(found), *lag, *([_effect_table(records)] if records else [])]
+
+
+def _named(joints: Sequence[str], values: Array) -> dict[str, float]:
+    return dict(zip(joints, map(float, values), strict=True))
+
+
+def _lag_in_words(found: Simulation) -> str:
+    """How far a robot that follows set points is from them, where that is most."""
+    run, joint, error = found.farthest
+    unit = "m" if found.truth.sliding[joint] else "rad"
+    name = found.dataset.joint_names[joint]
+    return f"Largest distance to the set points: {error:.3g} {unit} at '{name}' in {run}."
 
 
 def _records(found: Simulation) -> list[dict[str, Any]]:

@@ -22,6 +22,8 @@ from excite_cli import (
     read_result,
     simulate,
 )
+from excite_cli.api.simulating import PositionDrive, _warn_of_reading
+from excite_cli.config.data_spec import MeasurementSpec
 from tests.api.conftest import SMOKE, Loop
 
 Take = Callable[..., object]
@@ -94,6 +96,16 @@ def test_motions_are_entered_from_a_posture(loop: Loop) -> None:
     assert [note.text.partition(":")[0] for note in told] == ["motion_1"]
     with pytest.raises(ConfigError, match=r"--from: joint 'elbov' is unknown\. Did you mean 'elb"):
         simulate(loop.problem, first, start={"elbov": 0.3})
+
+
+def test_a_config_that_takes_torques_from_set_points_is_compared_with_the_file() -> None:
+    by_command = MeasurementSpec().model_copy(update={"torque": "command"})
+    drives = SimulationSettings(drive=PositionDrive((9.0,), (1.0,)))
+    told: list[Note] = []
+    _warn_of_reading(by_command, drives, told.append)
+    assert not told
+    _warn_of_reading(by_command, SimulationSettings(), told.append)
+    assert any("simulate with --control position" in note.sentence for note in told)
 
 
 def test_a_config_that_converts_is_warned_of(loop: Loop, tmp_path: Path) -> None:

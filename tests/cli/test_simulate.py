@@ -92,9 +92,47 @@ def test_people_get_tables_and_quiet_ones_nothing_else(excite: Program, two_moti
     assert [path.name for path in excite.folder.iterdir()] == ["x.h5"]
 
 
+DRIVES = (
+    "--control", "position", "--kp", "400", "--kd", "20", "--kp", "wrist_roll=5",
+    "--kd", "wrist_roll=0.1", "--effect", "armature@wrist_roll=0.02",
+)  # fmt: skip
+
+
+def test_drives_that_follow_set_points(excite: Program, two_motions: Run) -> None:
+    """Positions, set points and no torque; how far they are apart; the law in the truth."""
+    common = ("--motion", "1", "--rate", "100", "--command-rate", "50")
+    arguments = (SMOKE, two_motions.path, "-o", "set.h5", *DRIVES, *common)
+    done = excite.good("simulate", *arguments)
+    assert "Largest distance to the set points: " in done.stdout
+    assert "holds set points (q_cmd) and no torques" in done.stderr
+    with h5py.File(excite.folder / "set.h5") as file:
+        run = file["runs/motion_1"]
+        assert set(run) == {"t", "q", "q_cmd"}
+        q, sent = run["q"][()], run["q_cmd"][()]
+        drive = json.loads(file.attrs["truth"])["drive"]
+        assert json.loads(file.attrs["settings"])["drive"]["command_rate"] == 50.0
+    assert np.array_equal(sent[::2][: len(sent[1::2])], sent[1::2])
+    assert drive["kp"]["wrist_roll"] == 5.0
+    assert drive["kd"]["elbow"] == 20.0
+    slow = ("simulate", *arguments, "--overwrite", "--kp", "40", "--kp", "slide=500")
+    far = excite.good(*slow, "--set-point-speeds")
+    assert "from its set points: what moves is not the planned motion" in far.stderr
+    with h5py.File(excite.folder / "set.h5") as file:
+        assert set(file["runs/motion_1"]) == {"t", "q", "q_cmd", "v_cmd"}
+    answer = excite.answer(*slow)
+    largest = answer["runs"][0]["largest_error"]
+    assert largest["wrist_roll"] > 0.0
+    assert max(largest.values()) > np.abs(sent - q).max()
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        (("--kp", "20"), "--kp: only drives that follow set points have it. Add --control pos"),
+        (("--command-delay", "0"), "--command-delay: only drives that follow set points"),
+        (("--control", "position", "--kp", "9"), "--control position: --kd missing. Give the"),
+        (("--control", "position", "--kp", "9", "--kd", "elbo=1"), "no joint 'elbo'. Did you"),
+        ((*DRIVES, *STANDING), "--control position: only robots on a fixed base"),
         (("--effect", "coulomb_friction@elbw=1"), "Did you mean 'elbow'?"),
         (("--motion", "7"), "has no motion 7; it has 1, 2"),
         (("--effect", "covariate_offset@elbow=1;covariate:temp"), "--covariate temp=25,"),
