@@ -15,9 +15,9 @@ what the description says of its masses (`inertial_prior`, 30 %) tells the facto
 
     min over φ, f, κ = log kp of  Σ_j n_j log ‖e_j − ((Y φ)_j + F_j f_j) exp(−κ_j)‖ + prior(φ),
 
-n_j the samples that count, fewer than there are where what is left varies slowly. Drives of one
-gain are taken where gains of their own explain no more (Bayes' information criterion): hips of a
-quadruped whose legs hang hardly show theirs.
+n_j the samples that count, fewer than there are where what is left varies slowly, and the drives'
+gains taken to be within a factor of 1.6 of each other (one standard deviation): of a joint that
+carries little, friction and rotor take up what its gain would be.
 """
 
 from collections.abc import Callable, Sequence
@@ -48,9 +48,10 @@ _GRID = 2e-3  # s
 _PARTS = 10  # of the time, of which each is left out once
 _NEAR = 1e-3  # s around the best delay, for the curvature
 _STEPS, _SETTLED = 30, 1e-4  # of Gauss and Newton; in log kp
-_GAIN_STD = 0.3  # of gains that were found: the fit may move them as far as it moves masses
-_FAR = 2.0  # standard deviations of φ beyond which a direction says less and less
-_ALIKE, _EQUAL = 1.0, 1e-4  # standard deviations of log kp among joints, if it differs or does not
+# One standard deviation of gains that were found: as far as the fit may move masses, or as they
+# are known, up to a factor of two.
+_GAIN_STD = (0.3, 1.0)
+_ALIKE = 0.5  # of log kp, one standard deviation: drives of a robot are of a few sizes
 _ROUNDS = 2  # of delay and gains in turn
 _DRIVEN = 0.2  # rad off its set point at which a drive gives its joint's largest torque, usually
 
@@ -73,7 +74,8 @@ class FoundLaw:
         command = measured.command.model_copy(update=numbers)
         identification = spec.identification
         if self.gain_std is not None and identification.gain_std is None:
-            identification = identification.model_copy(update={"gain_std": _GAIN_STD})
+            std = float(np.clip(self.gain_std.max(), *_GAIN_STD))
+            identification = identification.model_copy(update={"gain_std": float(f"{std:.2g}")})
         return spec.model_copy(
             update={
                 "measurement": measured.model_copy(update={"command": command}),
@@ -268,14 +270,8 @@ class _Rows:
         """
         errors = self.torque(law)[:, self._first :] / law.kp
         joints, prior = self._compact(errors), self._prior()
-        found = _fit_gains(joints, self._start(law.kp), prior, _ALIKE)
-        lasting = self._correlation(errors, found)
-        found = _fit_gains(joints, found, prior, _ALIKE, lasting)
-        one = np.full_like(found.kappa, found.kappa.mean())
-        same = _fit_gains(joints, replace(found, kappa=one), prior, _EQUAL, lasting)
-        rows = float(np.sum([m for _, m in joints] / lasting))
-        if same.cost < found.cost + 0.5 * (len(one) - 1) * np.log(rows):
-            found = same
+        found = _fit_gains(joints, self._start(law.kp), prior)
+        found = _fit_gains(joints, found, prior, self._correlation(errors, found))
         wild = ~np.isfinite(found.kappa) | (np.abs(found.kappa) > np.log(1e6))
         if wild.any():
             names = self._robot.joint_names[self._first :]
@@ -334,41 +330,32 @@ class _Rows:
 
 @dataclass(frozen=True)
 class _Gains:
-    """Parameters theta (p,) of the textbook's model, κ = log kp (n,) and its deviations (n,).
-
-    `cost`: minus the logarithm of the posterior.
-    """
+    """Parameters theta (p,) of the textbook's model, κ = log kp (n,) and its deviations (n,)."""
 
     theta: Array
     kappa: Array
     std: Array
-    cost: float = 0.0
 
 
 def _fit_gains(
     joints: Sequence[tuple[Array, int]],
     start: _Gains,
     prior: tuple[Array, Array],
-    spread: float,
     lasting: Array | None = None,
 ) -> _Gains:
-    """The minimum over φ, f and κ by Gauss and Newton, steps halved until they lead down.
-
-    A model that lacks something is far off in a few directions of φ: they count less there, by the
-    weights of Cauchy's loss.
-    """
+    """The minimum over φ, f and κ by Gauss and Newton, steps halved until they lead down."""
     n, rank, (whiten, target) = len(joints), len(prior[1]), prior
     width = len(start.theta)
     counts = np.array([m for _, m in joints]) / (1.0 if lasting is None else lasting)
-    alike = (np.eye(n) - 1.0 / n) / spread
+    alike = (np.eye(n) - 1.0 / n) / _ALIKE
 
     def noise(x: Array) -> Array:
         left = [np.linalg.norm(_left(own, x[:width], x[width + k])) for k, (own, _) in each]
         return np.array(left) / np.sqrt([m for _, m in joints]) + 1e-12
 
     def unlikely(x: Array) -> float:
-        off = (whiten @ x[:rank] - target) / _FAR
-        return float(0.5 * _FAR**2 * np.log1p(off**2).sum())
+        off = whiten @ x[:rank] - target
+        return float(0.5 * off @ off)
 
     def cost(x: Array) -> float:
         differ = alike @ x[width:]
@@ -385,12 +372,10 @@ def _fit_gains(
             block[:, :width], block[:, width + k] = slope, -slope @ x[:width]
             matrix.append(block * weights[k])
             right.append(_left(own, x[:width], x[width + k]) * weights[k])
-        off = target - whiten @ x[:rank]
-        loose = 1.0 / np.sqrt(1.0 + (off / _FAR) ** 2)
         known = np.zeros((rank + n, width + n))
-        known[:rank, :rank], known[rank:, width:] = whiten * loose[:, None], alike
+        known[:rank, :rank], known[rank:, width:] = whiten, alike
         a = np.concatenate([*matrix, known])
-        b = np.concatenate([*right, off * loose, -alike @ x[width:]])
+        b = np.concatenate([*right, target - whiten @ x[:rank], -alike @ x[width:]])
         scale = np.maximum(np.linalg.norm(a, axis=0), 1e-30)
         change = np.linalg.lstsq(a / scale, b, rcond=1e-10)[0] / scale
         before, share = cost(x), 1.0
@@ -401,7 +386,7 @@ def _fit_gains(
             break
     inverse = np.linalg.pinv((a / scale).T @ (a / scale), hermitian=True)
     std = np.sqrt(np.diag(inverse))[width:] / scale[width:]
-    return _Gains(x[:width], x[width:], std, cost(x))
+    return _Gains(x[:width], x[width:], std)
 
 
 def _left(own: Array, theta: Array, kappa: float) -> Array:

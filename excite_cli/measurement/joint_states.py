@@ -158,10 +158,10 @@ class JointStates:
             elif sizes == {0} and channel not in wanted.needed:
                 pass
             elif sizes == {0}:
+                needed = " and ".join(FIELDS.get(each, each) for each in wanted.needed)
                 raise FileError(
-                    f"{path}: messages of topic {self.topic} carry no {field}; needed: "
-                    f"{' and '.join(FIELDS.get(each, each) for each in wanted.needed)}. Record a driver that "
-                    "publishes them."
+                    f"{path}: messages of topic {self.topic} carry no {field}; needed: {needed}. "
+                    "Record a driver that publishes them."
                 )
             else:
                 raise FileError(

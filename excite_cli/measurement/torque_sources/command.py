@@ -40,7 +40,7 @@ class DriveLaw:
 
 
 def held(run: Run, delay: float) -> Mapping[str, Array]:
-    """What drives act upon `delay` [s] after it was sent: those of q*, v*, τ_ff (T, n) there are."""
+    """What drives act upon `delay` [s] after it was sent: q*, and v*, τ_ff if there, (T, n)."""
     step = run.step if len(run.t) > 1 else 0.0
     at = run.t - delay - 0.5 * step
     found = {}
