@@ -8,13 +8,11 @@ from pathlib import Path
 from excite_cli.api.approach import Start, durations_of
 from excite_cli.api.arguments import checked
 from excite_cli.api.exported_chains import ChainRequest, ExportedChain, chains_of
-from excite_cli.api.models import for_simulators, write_exported, write_model, write_models
+from excite_cli.api.model_exports import ModelRequest, write_requested
 from excite_cli.api.outputs import held
 from excite_cli.api.paths import existing, paths_in
 from excite_cli.claim import claim, leave
-from excite_cli.config.load_spec import files_of_config
 from excite_cli.errors import ConfigError, FileError, nearest
-from excite_cli.export.c_model import c_model
 from excite_cli.export.model_formats import MODEL_FORMATS
 from excite_cli.export.timed import timed_motion
 from excite_cli.given_files import refuse_inputs_as_outputs
@@ -23,9 +21,8 @@ from excite_cli.motion_formats.catalogue import MOTION_FORMATS
 from excite_cli.shown.answer import Answer, Command, as_word
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.diagnosis_file import is_diagnosis
-from excite_cli.store.fit_file import is_fit, read_fit
-from excite_cli.store.model_file import is_text, read_model
-from excite_cli.store.thresholds_file import read_thresholds
+from excite_cli.store.fit_file import is_fit
+from excite_cli.store.model_file import is_text
 from excite_cli.summary.pairs import not_modelled_in_words
 
 
@@ -75,6 +72,8 @@ def export_file(
     slow: float | None = None,
     start: Start | None = None,
     thresholds: str | Path | None = None,
+    samples: int | None = None,
+    seed: int | None = None,
     allow_unproved: bool = False,
     overwrite: bool = False,
     tell: Tell = log_note,
@@ -83,7 +82,8 @@ def export_file(
 
     `file` is a result, a motion in a controller's format, or a model (a fit, a diagnosis, a config
     with its numbers). Formats of motions are `csv`, `ros2`, `rosbag2`, `mcap`, `moveit`, `npz` and
-    those of packages, of models `urdf`, `mjcf`, `c`, and of fits `yaml`. `output` is by default
+    those of packages, of models `urdf`, `mjcf`, `c`, `randomization`, of those whose
+    robot follows set points `isaaclab`, `mjlab`, `bam`, and of fits `yaml`. `output` is by default
     named after `file`; several motions get their numbers before the suffix.
 
     Motions (`chosen` of a result's by their index) are sampled at `rate` [Hz], exact at every
@@ -96,6 +96,7 @@ def export_file(
     only with `allow_unproved`.
 
     `thresholds` (JSON of `excite score --thresholds`) make a model in C a collision detector, too.
+    `samples` (100) robots are drawn with `seed` (1) for `randomization`.
 
     Raises
     ------
@@ -127,7 +128,13 @@ def export_file(
         raise ConfigError(f"--thresholds: only a model in C holds them, not {format}.")
     if format in MODEL_FORMATS:
         limits = None if thresholds is None else existing(thresholds)
-        return _export_model(path, format, target, limits, overwrite, tell)
+        to = target or Path(f"{path.stem}{MODEL_FORMATS[format]}")
+        wanted = ModelRequest(path, format, to, limits, samples, seed)
+        with held({"output": to}, overwrite, (path, *paths_in(limits))):
+            write_requested(wanted, tell)
+        return Exported(format, (to,))
+    if samples is not None or seed is not None:
+        raise ConfigError("--samples, --seed: only --format randomization draws samples.")
     exporter = MOTION_FORMATS.members[format]()
     chains = chains_of(path, ChainRequest(chosen, periods, slow, start, allow_unproved), tell)
     paths = _paths(path, target, exporter, [each.name for each in chains])
@@ -225,41 +232,3 @@ def _held(paths: list[Path], exporter: MotionFormat, overwrite: bool) -> Iterato
                 replace = ", or replace it with --overwrite" if replaceable else ""
                 raise FileError(f"{path} exists already. Give another name{replace}.")
         yield
-
-
-def _export_model(
-    file: Path,
-    format: str,
-    output: Path | None,
-    thresholds: Path | None,
-    overwrite: bool,
-    tell: Tell,
-) -> Exported:
-    """A fit, a diagnosis or a config with its numbers as URDF, MJCF, YAML or C.
-
-    URDF and MJCF hold physically consistent bodies, and straight friction where they have no form
-    for what was found; C is the model that the table of errors belongs to.
-    """
-    path = output or Path(f"{file.stem}{MODEL_FORMATS[format]}")
-    with held({"output": path}, overwrite, (file, *paths_in(thresholds))):
-        stored = read_model(file)
-        config = file if stored.what in ("config", "urdf") else None
-        own = files_of_config(stored.spec, stored.folder, config)
-        refuse_inputs_as_outputs({"--output": path}, (*own, *stored.sources))
-        if format == "c":
-            names = stored.robot.joint_names
-            limits = None if thresholds is None else read_thresholds(thresholds, names)
-            write_exported(c_model(stored.robot, stored.model, "", limits), path, tell)
-        elif format != "yaml":
-            model, notes = for_simulators(stored, format)
-            for note in notes:
-                tell(Note(Level.NOTE, f"{path}: {note}"))
-            write_model(stored.robot, model, format, path, tell)
-        elif stored.what == "fit":
-            write_models(stored.robot, read_fit(file).fit, {"parameters": path}, tell)
-        else:
-            raise FileError(
-                f"{file} is not a fit; --format yaml takes fits only (write one "
-                "with excite identify -o)."
-            )
-    return Exported(format, (path,))

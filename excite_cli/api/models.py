@@ -1,10 +1,11 @@
 """Identified models as files: URDF, MJCF, YAML of all parameters."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from excite_cli.atomic import write_text_atomically
 from excite_cli.export import mjcf, urdf
+from excite_cli.export.drive import Drive
 from excite_cli.export.exported import ModelText
 from excite_cli.export.parameters import parameters_yaml
 from excite_cli.identification.fit import Fit
@@ -15,27 +16,25 @@ from excite_cli.scoring.straight_friction import with_straight_friction
 from excite_cli.shown.note import Level, Note, Tell
 from excite_cli.store.model_file import consistent_model
 
-_WRITERS: dict[str, Callable[[Robot, IdentifiedModel], ModelText]] = {
-    "urdf": urdf.updated_urdf,
-    "mjcf": mjcf.mjcf,
-}
-
-
 _HOLDS = {"urdf": urdf.holds, "mjcf": mjcf.holds}
 
 
 def write_models(
-    robot: Robot, fit: Fit, paths: Mapping[str, str | Path | None], tell: Tell
+    robot: Robot,
+    fit: Fit,
+    paths: Mapping[str, str | Path | None],
+    tell: Tell,
+    drive: Drive | None = None,
 ) -> None:
     """Write `fit` to the paths that are given: `urdf`, `mjcf`, `parameters` (YAML).
 
-    What a format cannot hold is reported.
+    What a format cannot hold is reported. `drive`: what the robot's set points are followed by.
     """
     for kind, path in paths.items():
         if path is not None and kind == "parameters":
             write_text_atomically(Path(path), parameters_yaml(robot, fit))
         elif path is not None:
-            write_model(robot, fit.best_model, kind, Path(path), tell)
+            write_model(robot, fit.best_model, kind, Path(path), tell, drive)
 
 
 def for_simulators(stored: StoredModel, kind: str) -> tuple[IdentifiedModel, tuple[str, ...]]:
@@ -51,9 +50,19 @@ def for_simulators(stored: StoredModel, kind: str) -> tuple[IdentifiedModel, tup
     return model, (text,)
 
 
-def write_model(robot: Robot, model: IdentifiedModel, kind: str, path: Path, tell: Tell) -> None:
+def write_model(
+    robot: Robot,
+    model: IdentifiedModel,
+    kind: str,
+    path: Path,
+    tell: Tell,
+    drive: Drive | None = None,
+) -> None:
     """Write a model as `kind`: `urdf` or `mjcf`; what that cannot hold is reported."""
-    write_exported(_WRITERS[kind](robot, model), path, tell)
+    if kind == "urdf":
+        write_exported(urdf.updated_urdf(robot, model), path, tell)
+    else:
+        write_exported(mjcf.mjcf(robot, model, drive), path, tell)
 
 
 def write_exported(exported: ModelText, path: Path, tell: Tell) -> None:

@@ -24,7 +24,8 @@ def export(
             "--format",
             "-f",
             metavar="FORMAT",
-            help="{motion_formats} of motions; urdf, mjcf, c of models; yaml of fits.",
+            help="{motion_formats} of motions; urdf, mjcf, c, randomization of models; isaaclab, "
+            "mjlab, bam of those whose robot follows set points; yaml of fits.",
             autocompletion=complete_format,
         ),
     ],
@@ -76,6 +77,16 @@ def export(
             help="Thresholds of `score --thresholds`: adds a collision detector to c.",
         ),
     ] = None,
+    samples: Annotated[
+        int | None,
+        typer.Option(
+            "--samples", min=1, help="With -f randomization: robots to draw. Default: 100."
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option("--seed", min=0, help="With -f randomization: of the draw. Default: 1."),
+    ] = None,
     allow_unproved: Annotated[
         bool,
         typer.Option(
@@ -100,7 +111,8 @@ def export(
     robot changed since), or was written by an earlier version, is refused.
 
     A model is a fit, a diagnosis or a config of `diagnose --apply`. As C it is one file without
-    dependencies or allocation, with all effects that C can hold and a self-test.
+    dependencies or allocation, with all effects that C can hold and a self-test. For domain
+    randomization there are mean, covariance and samples of all numbers that simulators hold.
 
     Examples:
       excite export ur10.h5 --format csv --motion 1 -o motion.csv
@@ -108,6 +120,7 @@ def export(
       excite export ur10.h5 --format csv --motion 1 --slow 0.3 -o slow.csv
       excite export fit.h5 --format mjcf -o identified.xml
       excite export diagnosis.h5 --format c -o arm.c
+      excite export fit.h5 --format randomization --samples 100 --seed 1
     """
     from excite_cli.api.exporting import export_answer, export_file
     from excite_cli.api.working import single_threaded
@@ -125,6 +138,8 @@ def export(
             slow=slow,
             start=start_from(posture, entry),
             thresholds=thresholds,
+            samples=samples,
+            seed=seed,
             allow_unproved=allow_unproved,
             overwrite=overwrite,
             tell=terminal.tell,

@@ -1,7 +1,8 @@
 """A MuJoCo model (MJCF) of the moved joints with identified inertias and joint effects.
 
-The kinematic tree, one body per joint that moves, no shapes and no actuators: MuJoCo's inverse
-dynamics of it gives the identified torque. A floating base stands at its reference. Joints that
+The kinematic tree, one body per joint that moves, and no shapes: MuJoCo's inverse dynamics of it
+gives the identified torque. Actuators are those of robots that follow set points
+(`mjcf_actuators.py`). A floating base stands at its reference. Joints that
 follow others (mimic) are coupled by <equality>, which MuJoCo's inverse dynamics leaves out: add
 their torques to their drivers', times the multiplier.
 """
@@ -15,6 +16,7 @@ import numpy as np
 from excite_cli.effects.base import Effect
 from excite_cli.effects.mjcf_parts import MjcfParts
 from excite_cli.errors import RobotError
+from excite_cli.export.drive import Drive
 from excite_cli.export.exported import (
     ModelText,
     in_words,
@@ -22,6 +24,7 @@ from excite_cli.export.exported import (
     ten_as_body,
     vector,
 )
+from excite_cli.export.mjcf_actuators import add_actuators, held_by_actuators
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.tree import Tree, TreeJoint, tree_of
@@ -29,8 +32,10 @@ from excite_cli.robot.tree import Tree, TreeJoint, tree_of
 _POINT = 1e-6  # kg·m²: no body that moves has less, to MuJoCo
 
 
-def mjcf(robot: Robot, model: IdentifiedModel) -> ModelText:
-    """The model's text, and what MJCF cannot hold.
+def mjcf(robot: Robot, model: IdentifiedModel, drive: Drive | None = None) -> ModelText:
+    """The model's text, and what MJCF cannot hold; with the actuators of a `drive`, if given.
+
+    What the model holds for gains and offsets of the drive's law is in the actuators.
 
     Raises
     ------
@@ -39,7 +44,7 @@ def mjcf(robot: Robot, model: IdentifiedModel) -> ModelText:
     """
     tree = tree_of(robot)
     phi = model.phi + model.carried(robot)
-    parts, left = _parts(robot, model, tree.gravity)
+    parts, left = joint_parts(robot, model)
     root = ElementTree.Element("mujoco", {"model": robot.name})
     ElementTree.SubElement(root, "compiler", {"angle": "radian", "autolimits": "false"})
     ElementTree.SubElement(root, "option", {"gravity": vector(parts.gravity)})
@@ -58,8 +63,12 @@ def mjcf(robot: Robot, model: IdentifiedModel) -> ModelText:
         placed.append(body)
     _add_tendons(root, robot, parts)
     _add_couplings(root, robot, tree)
-    ElementTree.indent(root)
     notes = ["it has no shapes, actuators or sensors"]
+    if drive is not None:
+        left = [effect for effect in left if not held_by_actuators(effect)]
+        notes = ["it has no shapes or sensors"]
+        notes += add_actuators(root, robot.joint_names, drive.corrected(model))
+    ElementTree.indent(root)
     if robot.payload is not None:
         notes.append(f"the payload ({robot.payload.in_words}) is part of its body")
     if left:
@@ -133,9 +142,10 @@ def holds(effect: Effect, values: Array) -> bool:
     return effect.put_into_mjcf(parts, values)
 
 
-def _parts(robot: Robot, model: IdentifiedModel, gravity: Array) -> tuple[MjcfParts, list[Effect]]:
+def joint_parts(robot: Robot, model: IdentifiedModel) -> tuple[MjcfParts, list[Effect]]:
     """What the effects become in MuJoCo, and those that have no place there."""
-    parts = MjcfParts([{} for _ in range(robot.n)], np.array(gravity), _knows_polynomials())
+    gravity = np.array(tree_of(robot).gravity)
+    parts = MjcfParts([{} for _ in range(robot.n)], gravity, _knows_polynomials())
     left = [
         effect
         for effect, values in model.by_effect

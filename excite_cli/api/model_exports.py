@@ -1,0 +1,206 @@
+"""Identified models for simulators: the part of `excite export` that is about models."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from excite_cli.api.models import for_simulators, write_exported, write_model, write_models
+from excite_cli.config.load_spec import files_of_config
+from excite_cli.dynamics.base_parameters import find_base_parameters
+from excite_cli.dynamics.inertial_prior import UNSURE, inertial_prior
+from excite_cli.dynamics.pseudo_inertia import body_lengths
+from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.errors import ConfigError, FileError
+from excite_cli.export import actuator_configs, bam, mjcf
+from excite_cli.export.c_model import c_model
+from excite_cli.export.drive import Drive, drive_of
+from excite_cli.export.exported import ModelText
+from excite_cli.export.joint_values import joint_values
+from excite_cli.export.model_formats import OF_DRIVES
+from excite_cli.export.randomization import quantities, randomization
+from excite_cli.given_files import refuse_inputs_as_outputs
+from excite_cli.identification.fit import effect_parameters
+from excite_cli.identification.identified_model import IdentifiedModel
+from excite_cli.identification.stored_model import StoredModel
+from excite_cli.identification.uncertain_model import (
+    UncertainModel,
+    from_covariance,
+    from_information,
+    uncertain,
+)
+from excite_cli.robot.model import Array, Robot
+from excite_cli.scoring.straight_friction import with_straight_friction
+from excite_cli.shown.note import Level, Note, Tell
+from excite_cli.store.diagnosis_file import read_diagnosis
+from excite_cli.store.fit_file import read_fit
+from excite_cli.store.model_file import consistent_model, read_model
+from excite_cli.store.thresholds_file import read_thresholds
+
+
+@dataclass(frozen=True)
+class ModelRequest:
+    """A model's file as `format` in `path`; `thresholds` (C), `samples` and `seed` (randomization).
+
+    The last two are None where nobody asked for them.
+    """
+
+    file: Path
+    format: str
+    path: Path
+    thresholds: Path | None = None
+    samples: int | None = None
+    seed: int | None = None
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for options of other formats."""
+        for option, value in (("--samples", self.samples), ("--seed", self.seed)):
+            if value is not None and self.format != "randomization":
+                raise ConfigError(f"{option}: only --format randomization draws samples.")
+        if self.samples is not None and not 1 <= self.samples <= MOST_SAMPLES:
+            raise ConfigError(f"--samples {self.samples}: allowed: 1 to {MOST_SAMPLES:,}.")
+
+
+MOST_SAMPLES = 100_000
+_SAMPLES, _SEED = 100, 1
+
+
+def write_requested(wanted: ModelRequest, tell: Tell) -> None:
+    """A fit, a diagnosis or a config with its numbers as a file of another program.
+
+    URDF and MJCF hold physically consistent bodies, and straight friction where they have no form
+    for what was found; C is the model that the table of errors belongs to.
+    """
+    stored = read_model(wanted.file)
+    config = wanted.file if stored.what in ("config", "urdf") else None
+    own = files_of_config(stored.spec, stored.folder, config)
+    refuse_inputs_as_outputs({"--output": wanted.path}, (*own, *stored.sources))
+    robot, format, path = stored.robot, wanted.format, wanted.path
+    if format == "c":
+        names = robot.joint_names
+        limits = None if wanted.thresholds is None else read_thresholds(wanted.thresholds, names)
+        write_exported(c_model(robot, stored.model, "", limits), path, tell)
+    elif format in OF_DRIVES:
+        write_exported(_actuators(stored, format, path, tell), path, tell)
+    elif format == "randomization":
+        write_exported(_randomization(stored, wanted), path, tell)
+    elif format != "yaml":
+        model = _simple(stored, format, path, tell)
+        write_model(robot, model, format, path, tell, drive_of(stored.spec, robot.joint_names))
+    elif stored.what == "fit":
+        write_models(robot, read_fit(wanted.file).fit, {"parameters": path}, tell)
+    else:
+        raise FileError(
+            f"{wanted.file} is not a fit; --format yaml takes fits only (write one "
+            "with excite identify -o)."
+        )
+
+
+def _simple(stored: StoredModel, format: str, path: Path, tell: Tell) -> IdentifiedModel:
+    model, notes = for_simulators(stored, format)
+    for note in notes:
+        tell(Note(Level.NOTE, f"{path}: {note}"))
+    return model
+
+
+def _actuators(stored: StoredModel, format: str, path: Path, tell: Tell) -> ModelText:
+    """Actuator configs of a robot that follows set points."""
+    robot = stored.robot
+    drive = drive_of(stored.spec, robot.joint_names)
+    if drive is None:
+        raise FileError(
+            f"{stored.path}: --format {format} holds drives that follow set points, and this "
+            "robot's torque was measured. Take mjcf or urdf, or identify with "
+            "measurement.torque: command."
+        )
+    if format == "bam":
+        model, _ = with_straight_friction(stored, consistent_model(stored), bam.holds)
+        return bam.bam(robot, model, joint_values(robot, model, drive))
+    values = joint_values(robot, _simple(stored, "mjcf", path, tell), drive)
+    written = actuator_configs.isaaclab if format == "isaaclab" else actuator_configs.mjlab
+    return written(robot.name, values)
+
+
+def _randomization(stored: StoredModel, wanted: ModelRequest) -> ModelText:
+    """Correlated ranges and samples of the robot's numbers."""
+    robot = stored.robot
+    found = uncertain_model(stored)
+    drive: Drive | None = drive_of(stored.spec, robot.joint_names)
+    straight = bool(with_straight_friction(stored, found.model, mjcf.holds)[1])
+
+    def simplify(model: IdentifiedModel) -> IdentifiedModel:
+        return with_straight_friction(stored, model, mjcf.holds)[0] if straight else model
+
+    count, seed = wanted.samples or _SAMPLES, _SEED if wanted.seed is None else wanted.seed
+    y = quantities(robot, found.model, simplify, drive)
+    delay = None if drive is None else drive.delay
+    notes = ["samples are drawn among robots that can be: no link is moved to the border for it"]
+    if stored.model.of_single_runs:
+        notes.append("effects of single recordings are not in it")
+    return ModelText(randomization(y, found, count, seed, delay), tuple(notes))
+
+
+def uncertain_model(stored: StoredModel) -> UncertainModel:
+    """The model that simulators get, with its covariance; without effects of single recordings.
+
+    Raises
+    ------
+    FileError, ConfigError
+        It has no covariance; no robot like it can exist.
+    """
+    robot = stored.robot
+    base, cad = find_base_parameters(robot), standard_parameters(robot)
+    spec = stored.spec.identification
+    share = spec.uncertainty if spec.inertias == "cad" else UNSURE
+    prior = inertial_prior(robot, cad, share)
+    if stored.what == "fit":
+        fit = read_fit(stored.path).fit
+        model, estimate = fit.best_model, fit.model
+        root = from_covariance(base, prior, fit.covariance)
+    elif stored.what == "diagnosis":
+        model, estimate, factor = _of_diagnosis(stored, base.rank)
+        root = from_information(base, prior, factor)
+    else:
+        raise FileError(
+            f"{stored.path} holds no covariance. Give the fit (excite identify -o) or the "
+            "diagnosis (excite diagnose -o)."
+        )
+    kept = np.array(
+        [True] * len(model.phi)
+        + [not effect.runs for effect in model.effects for _ in effect.parameters]
+    )
+    center = np.concatenate([estimate.phi, estimate.values])[kept]
+    model = model.without(model.of_single_runs)
+    signs = np.array([p.nonnegative for p in effect_parameters(model.effects)], bool)
+    return uncertain(
+        model, center, root[kept], _carry(robot, model), body_lengths(robot, cad), signs
+    )
+
+
+def _of_diagnosis(stored: StoredModel, rank: int) -> tuple[IdentifiedModel, IdentifiedModel, Array]:
+    """The consistent model, that of the data alone, and the factor of their information.
+
+    All in the order of the effects that this has.
+    """
+    found, model = read_diagnosis(stored.path), consistent_model(stored)
+    size = rank + len(model.values)
+    told = [(r.kind, r.joints, r.runs) for r in found.information.model]
+    names = stored.robot.joint_names
+    here = [(e.kind, tuple(names[j] for j in e.joints), e.runs) for e in model.effects]
+    if told != here:
+        raise FileError(
+            f"{stored.path}: its covariance is of other effects than its model. Diagnose again."
+        )
+    own = {(e.kind, e.joints, e.runs, e.covariate): x for e, x in stored.model.by_effect}
+    values = [own[e.kind, e.joints, e.runs, e.covariate] for e in model.effects]
+    estimate = IdentifiedModel(
+        stored.model.phi, model.effects, np.concatenate([np.zeros(0), *values])
+    )
+    return model, estimate, found.information.factor[:size, :size]
+
+
+def _carry(robot: Robot, model: IdentifiedModel) -> Array:
+    """What one unit of each effect's parameter adds to φ (P, k)."""
+    units = np.eye(len(model.values))
+    columns = [IdentifiedModel(model.phi, model.effects, unit).carried(robot) for unit in units]
+    return np.stack(columns, axis=1) if columns else np.zeros((len(model.phi), 0))

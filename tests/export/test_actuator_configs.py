@@ -1,0 +1,115 @@
+"""The modules for Isaac Lab and mjlab, run against classes with the fields that theirs have."""
+
+import sys
+from dataclasses import make_dataclass
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from excite_cli.config.data_spec import EffectSpec
+from excite_cli.export.actuator_configs import isaaclab, mjlab
+from excite_cli.export.joint_values import JointValues, joint_values
+from tests.export.drives import KD, KP, LIMIT, drive, identified, ur10
+
+# Fields of isaaclab.actuators 2.3 (actuator_base_cfg.py, actuator_pd_cfg.py) and of
+# mjlab.actuator 1.6 (actuator.py, builtin_actuator.py).
+ISAACLAB = (
+    "joint_names_expr", "effort_limit", "velocity_limit", "effort_limit_sim", "velocity_limit_sim",
+    "stiffness", "damping", "armature", "friction", "dynamic_friction", "viscous_friction",
+)  # fmt: skip
+MJLAB = (
+    "target_names_expr", "transmission_type", "armature", "frictionloss", "viscous_damping",
+    "stiffness", "damping", "effort_limit", "delay_min_lag", "delay_max_lag",
+)  # fmt: skip
+
+
+def stub(name: str, *classes: type) -> ModuleType:
+    module = ModuleType(name)
+    for each in classes:
+        setattr(module, each.__name__, each)
+    return module
+
+
+def run(text: str, monkeypatch: pytest.MonkeyPatch) -> Any:
+    def fields(names: tuple[str, ...]) -> list[tuple[str, type, Any]]:
+        return [(name, object, None) for name in names]  # type: ignore[misc]
+
+    delays = ("min_delay", "max_delay")
+    classes = (
+        make_dataclass("ImplicitActuatorCfg", fields(ISAACLAB)),
+        make_dataclass("DelayedPDActuatorCfg", fields((*ISAACLAB, *delays))),
+    )
+    monkeypatch.setitem(sys.modules, "isaaclab", stub("isaaclab"))
+    monkeypatch.setitem(sys.modules, "isaaclab.actuators", stub("isaaclab.actuators", *classes))
+    built_in = make_dataclass("BuiltinPositionActuatorCfg", fields(MJLAB), kw_only=True)
+    monkeypatch.setitem(sys.modules, "mjlab", stub("mjlab"))
+    monkeypatch.setitem(sys.modules, "mjlab.actuator", stub("mjlab.actuator", built_in))
+    scope: dict[str, Any] = {}
+    exec(compile(text, "actuators.py", "exec"), scope)
+    return scope["ACTUATORS"]
+
+
+def values(delay: float) -> JointValues:
+    robot = ur10()
+    kinds = ("armature", "viscous_friction", "coulomb_friction")
+    specs = [EffectSpec(kind=kind, joints=("elbow_joint",)) for kind in kinds]
+    return joint_values(robot, identified(robot, *specs, numbers=(0.1, 0.2, 0.3)), drive(delay))
+
+
+def test_isaac_lab_with_a_delay(monkeypatch: pytest.MonkeyPatch) -> None:
+    exported = isaaclab("ur10", values(0.012))
+    drives = run(exported.text, monkeypatch)["drives"]
+    assert type(drives).__name__ == "DelayedPDActuatorCfg"
+    assert (drives.min_delay, drives.max_delay) == (2, 3), "0.012 s in steps of 0.005 s"
+    assert drives.joint_names_expr == list(ur10().joint_names)
+    assert drives.stiffness == dict(zip(ur10().joint_names, KP, strict=True))
+    assert drives.damping["elbow_joint"] == KD[2]
+    assert drives.armature["elbow_joint"] == 0.1
+    assert drives.viscous_friction["elbow_joint"] == 0.2
+    assert drives.friction["elbow_joint"] == pytest.approx(0.3)
+    assert drives.dynamic_friction == drives.friction
+    assert "wrist_1_joint" not in drives.effort_limit
+    assert drives.effort_limit["shoulder_pan_joint"] == LIMIT[0]
+    assert not exported.notes
+
+
+def test_isaac_lab_without_a_delay(monkeypatch: pytest.MonkeyPatch) -> None:
+    drives = run(isaaclab("ur10", values(0.0)).text, monkeypatch)["drives"]
+    assert type(drives).__name__ == "ImplicitActuatorCfg"
+    assert drives.effort_limit_sim["wrist_3_joint"] == LIMIT[5]
+    assert drives.effort_limit is None
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.01])
+def test_mjlab(delay: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    actuators = run(mjlab("ur10", values(delay)).text, monkeypatch)
+    assert [each.target_names_expr for each in actuators] == [(n,) for n in ur10().joint_names]
+    elbow = actuators[2]
+    assert (elbow.stiffness, elbow.damping, elbow.effort_limit) == (150.0, 5.0, 100.0)
+    assert (elbow.armature, elbow.viscous_damping, elbow.frictionloss) == (0.1, 0.2, 0.3)
+    assert actuators[3].effort_limit is None
+    lags = elbow.delay_min_lag, elbow.delay_max_lag
+    assert lags == ((2, 2) if delay else (None, None))
+
+
+def test_names_are_no_patterns(monkeypatch: pytest.MonkeyPatch) -> None:
+    odd = JointValues(("a.b", *ur10().joint_names[1:]), drive(), *np.zeros((3, 6)))
+    assert run(mjlab('"odd" \\', odd).text, monkeypatch)[0].target_names_expr == (r"a\.b",)
+    assert r"a\.b" in run(isaaclab("odd", odd).text, monkeypatch)["drives"].stiffness
+
+
+def test_what_is_not_in_them_is_reported() -> None:
+    spring = EffectSpec(kind="spring", joints=("elbow_joint",))
+    robot = ur10()
+    model = identified(
+        robot,
+        spring,
+        EffectSpec(kind="torque_offset", joints=("elbow_joint",)),
+        EffectSpec(kind="ripple", joints=("elbow_joint",)),
+    )
+    told = " | ".join(joint_values(robot, model, drive()).notes)
+    assert "not in it: ripple at elbow_joint. The file of parameters" in told
+    assert "springref, stiffness of elbow_joint. --format mjcf has it" in told
+    assert "offsets of the drives' torque at elbow_joint" in told
