@@ -28,6 +28,7 @@ from excite_cli.measurement.covariates import with_declared
 from excite_cli.measurement.dataset import Dataset, Finding, merged
 from excite_cli.measurement.motors import motors_of
 from excite_cli.measurement.quality import raise_for_errors
+from excite_cli.measurement.torque import with_torques
 from excite_cli.measurement.torque_sources.command import law_of
 from excite_cli.robot.description import is_named
 from excite_cli.robot.model import Array, Robot, build_measured_robot, build_robot
@@ -375,6 +376,7 @@ def dataset_of(
         )
     if not data.runs:
         raise FileError("the data hold no run. Give one, or read them with `load_data`.")
+    data = with_torques(data, problem.spec.measurement)
     for run in data.runs:
         if not all(np.isfinite(values).all() for values in (run.t, run.q, run.tau)):
             raise FileError(
@@ -391,8 +393,8 @@ def with_drive_law(
 
     Raises
     ------
-    FileError
-        A gain cannot be found.
+    ConfigError, FileError
+        There is no such held-out run; a run is too short.
     """
     if not is_sought(problem.spec.measurement):
         return problem, data

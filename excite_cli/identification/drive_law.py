@@ -33,8 +33,7 @@ from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.inertial_prior import UNSURE, inertial_prior
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION, catalogue
-from excite_cli.errors import FileError
-from excite_cli.identification.prepare import prepare_all
+from excite_cli.identification.prepare import prepare_all, smoothed
 from excite_cli.identification.processing import choose_processing
 from excite_cli.identification.regression import build_regression
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
@@ -120,16 +119,8 @@ def with_law(data: Dataset, old: DriveLaw, new: DriveLaw) -> Dataset:
 
 def _by(run: Run, old: DriveLaw, new: DriveLaw) -> Run:
     """What else was added to the torques stays (a weight that a controller took off)."""
-    tau = run.tau.copy()
-    own = _of_joints(run)
-    tau[:, run.base_rows :] += np.nan_to_num(new.torque(own) - old.torque(own))
-    return replace(run, tau=tau, torque_step=None)
-
-
-def _of_joints(run: Run) -> Run:
-    """Without the joints of a base, which no drive moves."""
-    dq = None if run.dq is None else run.dq[:, run.base_rows :]
-    return replace(run, q=run.q[:, run.base_rows :], dq=dq)
+    tau = run.tau + np.nan_to_num(new.torque(run) - old.torque(run))
+    return replace(run, tau=tau, torque_step=None, law=new)
 
 
 def find_law(robot: Robot, base: BaseParameters, runs: Sequence[Run], spec: Spec) -> FoundLaw:
@@ -138,22 +129,25 @@ def find_law(robot: Robot, base: BaseParameters, runs: Sequence[Run], spec: Spec
     Raises
     ------
     FileError
-        A run is too short; a joint's set points have nothing to do with its torque.
+        A run is too short.
     """
     told = spec.measurement.command
-    law = law_of(spec.measurement, robot.joint_names[robot.base_joints :])
+    given = law_of(spec.measurement, robot.joint_names[robot.base_joints :])
     rows = _Rows(robot, base, runs, spec)
-    delay_std = gain_std = None
-    if told.kp is None:
-        law = replace(law, kp=rows.first_gains(law))
-    for _ in range(_ROUNDS if told.kp is None and told.delay is None else 1):
+    if told.kp is not None:
+        delay, deviation = rows.delay(given)
+        return FoundLaw(replace(given, delay=delay), deviation, None)
+    # Without kp, kd beside it would be of another size: viscous friction takes it up.
+    law = replace(given, kd=np.zeros_like(given.kd), limit=np.full_like(given.limit, np.inf))
+    law = replace(law, kp=rows.first_gains(law))
+    delay_std = None
+    for _ in range(_ROUNDS if told.delay is None else 1):
         if told.delay is None:
             delay, delay_std = rows.delay(law)
             law = replace(law, delay=delay)
-        if told.kp is None:
-            kp, gain_std = rows.gains(law)
-            law = replace(law, kp=kp)
-    return FoundLaw(law, delay_std, gain_std)
+        kp, gain_std = rows.gains(law)
+        law = replace(law, kp=kp)
+    return FoundLaw(replace(law, kd=given.kd, limit=given.limit), delay_std, gain_std)
 
 
 class _Rows:
@@ -166,6 +160,7 @@ class _Rows:
             self._runs, spec.measurement.filter, spec.diagnosis.moving_speed
         )
         self._prepared = prepare_all(self._runs, processing)
+        self._runs = [replace(run, q=smoothed(run, processing)) for run in self._runs]
         kinds = [catalogue()[name] for name in (*EVERYDAY_FRICTION, *EVERYDAY)]
         effects = [kind(place) for kind in kinds for place in kind.places(robot)]
         found = build_regression(robot, base, effects, self._prepared)
@@ -183,8 +178,7 @@ class _Rows:
         """Averages (M, n) of the law's torque in the instants of the columns."""
         found = []
         for run, prepared in zip(self._runs, self._prepared, strict=True):
-            tau = np.zeros_like(run.q)
-            tau[:, self._first :] = law.torque(_of_joints(run))
+            tau = law.torque(run)
             at = [np.interp(prepared.t, run.t, column) for column in tau.T]
             found.append(prepared.averaged_for_fit(np.stack(at, axis=1)))
         return np.concatenate(found)
@@ -261,26 +255,11 @@ class _Rows:
         return np.where(np.isfinite(kp), kp, ratio * usual)
 
     def gains(self, law: DriveLaw) -> tuple[Array, Array]:
-        """kp (n,) [N·m/rad] and the standard deviations (n,) of its logarithm.
-
-        Raises
-        ------
-        FileError
-            The data leave a gain open by orders of magnitude.
-        """
+        """kp (n,) [N·m/rad] and the standard deviations (n,) of its logarithm."""
         errors = self.torque(law)[:, self._first :] / law.kp
         joints, prior = self._compact(errors), self._prior()
         found = _fit_gains(joints, self._start(law.kp), prior)
         found = _fit_gains(joints, found, prior, self._correlation(errors, found))
-        wild = ~np.isfinite(found.kappa) | (np.abs(found.kappa) > np.log(1e6))
-        if wild.any():
-            names = self._robot.joint_names[self._first :]
-            lost = ", ".join(name for name, bad in zip(names, wild, strict=True) if bad)
-            raise FileError(
-                f"the gain of {lost} cannot be found: its set points have nothing to do with how "
-                "it moves. Check measurement.channels: {q_cmd: …} and names, or give the gain, "
-                "measurement.command.kp [N·m/rad]."
-            )
         return np.exp(found.kappa), found.std
 
     def _start(self, kp: Array) -> "_Gains":

@@ -109,7 +109,9 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
             f"run '{run.label}': samples come at {fs:.3g} Hz, which no robot's log does. Check "
             "measurement.time."
         )
-    q = _positions(run, processing, fs)
+    q = smoothed(run, processing)
+    if run.law is not None:
+        run = run.law.of_smooth(run, q)
     border = int(np.ceil(processing.border * fs))
     stride = processing.working_stride
     inside = slice(border, len(run.t) - border)
@@ -227,9 +229,15 @@ def _averaged(
     return _JointAverages(own, np.asarray(full @ tau[:, j]), filled(full) & filled(own), rounding)
 
 
-def _positions(run: Run, processing: Processing, fs: float) -> Array:
-    """Smoothed positions (T, n), one joint after the other: filters take room."""
-    cutoff = processing.position_cutoff
+def smoothed(run: Run, processing: Processing) -> Array:
+    """Smoothed positions (T, n), one joint after the other: filters take room.
+
+    Raises
+    ------
+    FileError
+        They jump as no robot does.
+    """
+    fs, cutoff = 1.0 / run.step, processing.position_cutoff
     if cutoff is None:
         return run.q
     q = np.empty_like(run.q)

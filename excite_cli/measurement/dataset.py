@@ -6,7 +6,7 @@ configuration declares; nothing is dropped silently: `findings` says what was se
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,16 @@ _BEFORE = 20.0  # s: longer ago is forgotten
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Severity = Literal["note", "warning", "error"]
+
+
+class TorqueLaw(Protocol):
+    """What the torques of a run are computed by, where nobody measured them."""
+
+    def torque(self, run: "Run") -> Array:
+        """τ (T, n) [N·m], 0 where it is not the law's."""
+
+    def of_smooth(self, run: "Run", q: Array) -> "Run":
+        """The run with the torque at smoothed positions q (T, n)."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +60,8 @@ class Run(Shown):
     where samples were interpolated, the hash of the nearest one in the file. `torque_step` (n,):
     what torques are multiples of, 0 where they are not. `before` (L, n): of a block, the positions
     right before it, from which joints with a memory come. The first `base_rows` columns are a
-    base's, which has no friction: it counts at rest, too.
+    base's, which has no friction: it counts at rest, too. Torques that follow from the motion by a
+    `law` are taken anew where positions are smoothed.
     """
 
     name: str
@@ -69,6 +80,7 @@ class Run(Shown):
     torque_step: Array | None = None
     before: Array | None = None
     base_rows: int = 0
+    law: TorqueLaw | None = None
 
     @property
     def id(self) -> RunId:

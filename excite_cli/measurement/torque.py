@@ -17,7 +17,7 @@ import numpy as np
 
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import ConfigError, nearest
-from excite_cli.measurement.dataset import Array, Finding, Mask, Run
+from excite_cli.measurement.dataset import Array, Dataset, Finding, Mask, Run
 from excite_cli.measurement.motors import Motors, at_motors
 from excite_cli.measurement.torque_sources.base import per_joint
 from excite_cli.measurement.torque_sources.catalogue import torque_source
@@ -130,8 +130,22 @@ def to_joints(
     coupled = tau.copy()
     for j, k in np.argwhere(shares):  # not a product with S: 0 · NaN would spread over all joints
         coupled[:, j] += shares[j, k] * tau[:, k]
-    converted = replace(run, tau=coupled)
+    converted = replace(run, tau=coupled, law=source.law(spec, joints))
     return converted if motors is None else motors.at_joints(converted, spec)
+
+
+def with_torques(data: Dataset, spec: MeasurementSpec) -> Dataset:
+    """Data in rad and N·m at the joints, where no torque was recorded with that of the source."""
+    source = torque_source(spec)
+    runs = []
+    for run in data.runs:
+        held = set(source.channels) <= set(run.extra)
+        if held and not np.isfinite(run.tau).any():
+            joints = data.joint_names[run.base_rows :]
+            law = source.law(spec, joints)
+            run = replace(run, tau=source.torque(run, spec, joints), law=law)
+        runs.append(run)
+    return replace(data, runs=tuple(runs))
 
 
 def angle_units(spec: MeasurementSpec, joints: tuple[str, ...]) -> Array:

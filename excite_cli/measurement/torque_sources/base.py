@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from excite_cli.config.data_spec import MeasurementSpec
-from excite_cli.measurement.dataset import Array, Run
+from excite_cli.measurement.dataset import Array, Run, TorqueLaw
 
 
 class TorqueSource(ABC):
@@ -28,6 +28,10 @@ class TorqueSource(ABC):
     @abstractmethod
     def torque(self, run: Run, spec: MeasurementSpec, joints: tuple[str, ...]) -> Array:
         """τ (T, n) [N·m] (N) of a run whose positions and speeds are the joints' in rad (m)."""
+
+    def law(self, spec: MeasurementSpec, joints: tuple[str, ...]) -> TorqueLaw | None:
+        """What gives the torque anew at other positions; None where it was recorded."""
+        return None
 
 
 def per_joint(

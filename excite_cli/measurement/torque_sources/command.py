@@ -9,7 +9,7 @@ sample later.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,12 +31,26 @@ class DriveLaw:
     delay: float
 
     def torque(self, run: Run) -> Array:
-        """τ (T, n) [N·m] that the drives apply in a run with set points in its `extra`."""
-        late = held(run, self.delay)
-        tau = self.kp * (late["q_cmd"] - run.q)
-        tau += self.kd * (late.get("v_cmd", 0.0) - speeds_of(run))
-        tau += late.get("tau_ff", 0.0)
-        return np.clip(tau, -self.limit, self.limit)
+        """τ (T, n) [N·m] that the drives apply in a run with set points in its `extra`.
+
+        0 of the joints of a base, which no drive moves.
+        """
+        late, driven = held(run, self.delay), slice(run.base_rows, None)
+        tau = np.zeros_like(run.q)
+        own = self.kp * (late["q_cmd"] - run.q[:, driven])
+        own += self.kd * (late.get("v_cmd", 0.0) - speeds_of(run)[:, driven])
+        own += late.get("tau_ff", 0.0)
+        tau[:, driven] = np.clip(own, -self.limit, self.limit)
+        return tau
+
+    def of_smooth(self, run: Run, q: Array) -> Run:
+        """The run with the torque that its drives apply at its positions smoothed, q (T, n).
+
+        Noise of encoders times kp, and of their differences times kd, is many times that of the
+        positions that all other columns are made of. What was added to the torque stays.
+        """
+        smooth = replace(run, q=q)
+        return replace(run, tau=run.tau + self.torque(smooth) - self.torque(run))
 
 
 def held(run: Run, delay: float) -> Mapping[str, Array]:
@@ -74,3 +88,7 @@ class Command(TorqueSource):
     def torque(self, run: Run, spec: MeasurementSpec, joints: tuple[str, ...]) -> Array:
         """By the law of `measurement.command`."""
         return law_of(spec, joints).torque(run)
+
+    def law(self, spec: MeasurementSpec, joints: tuple[str, ...]) -> DriveLaw:
+        """That law."""
+        return law_of(spec, joints)
