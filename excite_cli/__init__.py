@@ -85,6 +85,7 @@ if TYPE_CHECKING:
     from excite_cli.scoring.records import Replay as Replay
     from excite_cli.scoring.records import Score as Score
     from excite_cli.scoring.records import ScoredRun as ScoredRun
+    from excite_cli.scoring.records import SetPointReplay as SetPointReplay
     from excite_cli.scoring.thresholds import Thresholds as Thresholds
     from excite_cli.shown.note import Level as Level
     from excite_cli.shown.note import Note as Note
@@ -150,7 +151,7 @@ _HOMES = {
     "measurement.dataset": ("Dataset", "Run"),
     "proposal.propose": ("Proposal",),
     "scoring.changes": ("Change", "Changes"),
-    "scoring.records": ("Replay", "Score", "ScoredRun"),
+    "scoring.records": ("Replay", "Score", "ScoredRun", "SetPointReplay"),
     "scoring.thresholds": ("Thresholds",),
     "shown.note": ("Level", "Note"),
     "simulation.settings": ("SimulationSettings",),

@@ -1,5 +1,6 @@
-"""`excite replay`: recorded torques played on an exported model."""
+"""`excite replay`: recorded torques, or set points, played on an exported model."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -15,6 +16,14 @@ def replay(
         bool,
         typer.Option("--held-out", help="Of the model's own data, use only the held-out part."),
     ] = False,
+    beside: Annotated[
+        Path | None,
+        typer.Option(
+            "--beside",
+            metavar="MODEL",
+            help="Where set points are played: another model of the robot, on the same log.",
+        ),
+    ] = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     verbose: options.Verbose = False,
@@ -26,10 +35,16 @@ def replay(
     it is. Both are stabilised by the same low-gain position loop (10 rad/s), since no model tracks
     on torques alone for long; the table shows how far each deviates from the measured motion.
 
+    Where drives follow set points (measurement.torque: command) the recorded set points are
+    played instead, on position actuators and with no loop that holds the model. The table has the
+    deviation 0.1, 1 and 10 s after starts from the measured state, and over the whole log. The URDF
+    gets the same gains, limits and delay.
+
     Exit status 1: the model deviates no less than the URDF.
 
     Examples:
       excite replay diagnosis.h5 measured.h5 --held-out
+      excite replay diagnosis.h5 legs.h5 --held-out --beside fit.h5
     """
     from excite_cli.api.replaying import replay as replay_data
     from excite_cli.api.replaying import replay_answer
@@ -37,5 +52,5 @@ def replay(
 
     terminal = Terminal(as_json, quiet, verbose, not no_progress)
     with single_threaded():
-        found = replay_data(model, data, held_out=held_out, tell=terminal.tell)
+        found = replay_data(model, data, held_out=held_out, beside=beside, tell=terminal.tell)
     terminal.show(replay_answer(found))

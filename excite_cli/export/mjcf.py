@@ -29,6 +29,7 @@ from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.tree import Tree, TreeJoint, tree_of
 
+STEP = 5e-4  # s: physics step of models with actuators
 _POINT = 1e-6  # kg·m²: no body that moves has less, to MuJoCo
 
 
@@ -47,7 +48,10 @@ def mjcf(robot: Robot, model: IdentifiedModel, drive: Drive | None = None) -> Mo
     parts, left = joint_parts(robot, model)
     root = ElementTree.Element("mujoco", {"model": robot.name})
     ElementTree.SubElement(root, "compiler", {"angle": "radian", "autolimits": "false"})
-    ElementTree.SubElement(root, "option", {"gravity": vector(parts.gravity)})
+    option = {"gravity": vector(parts.gravity)}
+    if drive is not None:  # the damping of stiff drives is taken implicitly, as in `replay`
+        option.update(integrator="implicitfast", timestep=number(STEP))
+    ElementTree.SubElement(root, "option", option)
     world = ElementTree.SubElement(root, "worldbody")
     placed: list[ElementTree.Element] = []
     for k, joint in enumerate(tree.joints):

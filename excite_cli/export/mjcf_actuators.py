@@ -19,6 +19,8 @@ from excite_cli.effects.torque_offset import TorqueOffset
 from excite_cli.export.drive import Drive
 from excite_cli.export.exported import number
 
+# s: a delay is usually a multiple of the physics step; rounding must not make it a step more.
+_ROUNDING = 1e-7
 _SHORTEST_STEP = 5e-4  # s: a physics step for which the history of set points is long enough
 
 
@@ -45,7 +47,8 @@ def add_actuators(root: ElementTree.Element, joint_names: Sequence[str], drive: 
             settings.update(forcelimited="true", forcerange=f"{number(-limit)} {number(limit)}")
         if delayed:
             history = ceil(drive.delay / _SHORTEST_STEP) + 1
-            settings.update(delay=number(drive.delay), nsample=str(history), interp="zoh")
+            late = round(max(drive.delay - _ROUNDING, _ROUNDING), 9)
+            settings.update(delay=number(late), nsample=str(history), interp="zoh")
         ElementTree.SubElement(actuators, kind, settings)
     if drive.delay > 0.0 and not delayed:
         text = f" A set point acts {number(drive.delay)} s after it was sent: delay ctrl by that. "

@@ -44,6 +44,51 @@ class Replay(Shown):
 
 
 @dataclass(frozen=True)
+class ReplayedModel:
+    """RMS deviation [rad] (m) of a model `name` by joint: `after` each horizon, and `whole`.
+
+    `whole` is over the log. NaN where no log is as long as the horizon. `lost`: it left all bounds.
+    """
+
+    name: str
+    after: dict[str, tuple[float, ...]]
+    whole: dict[str, float]
+    lost: bool = False
+
+    @property
+    def mean(self) -> float:
+        """Of `whole` over the joints."""
+        return sum(self.whole.values()) / len(self.whole)
+
+    def means(self) -> tuple[float, ...]:
+        """Of `after` over the joints."""
+        return tuple(sum(each) / len(each) for each in zip(*self.after.values(), strict=True))
+
+
+@dataclass(frozen=True, repr=False)
+class SetPointReplay(Shown):
+    """Recorded set points played on exported models with nothing that holds these.
+
+    `models`: the URDF as described (if it has masses), another one if it was asked for, and the
+    `model` itself; `starts` of each of the `horizons` [s] over `seconds` of the runs `names`.
+    """
+
+    model: str
+    names: tuple[str, ...]
+    seconds: float
+    horizons: tuple[float, ...]
+    starts: tuple[int, ...]
+    models: tuple[ReplayedModel, ...]
+    sliding: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def good(self) -> bool:
+        """Whether the model is nearer to the robot than the first one, if there is another."""
+        return len(self.models) == 1 or self.models[-1].mean < self.models[0].mean
+
+
+@dataclass(frozen=True)
 class RunExplanation:
     """What a run has that the model has not: an effect, its `parameters`, and what it explains.
 

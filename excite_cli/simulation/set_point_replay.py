@@ -1,0 +1,148 @@
+"""Set points of a log played on an exported model with actuators: does it move as the robot did?
+
+Nothing holds the model: its drives get what the robot's got,
+
+    ctrl(t) = q*(t − d) + (k_d v*(t − d) + τ_ff(t − d)) / k_p,
+
+with set points held from one sample to the next and d the delay of the command. The model begins in
+the measured state (q, v) at several starts, spread evenly over the log. Of its deviation
+e = q_model − q_measured there are, joint by joint,
+
+    e(H) = √(mean over starts of e²(t₀ + H))    for the horizons H,
+
+and the RMS over the whole log, from its first sample on and without another start.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from excite_cli.robot.model import Array
+from excite_cli.simulation.mujoco_model import load_mujoco, silent_engine
+
+HORIZONS = (0.1, 1.0, 10.0)  # s
+_MOST_STARTS, _MOST_SECONDS = 40, 200.0  # of each horizon
+_LOST = np.pi  # rad (m): more is a model that fell over
+_CHUNK = 20_000  # physics steps whose states are kept at a time
+_ROUNDING = 1e-6  # s
+
+
+@dataclass(frozen=True)
+class SetPointInput:
+    """A measured motion, and what the drives got meanwhile.
+
+    `q, v` (T, m) at equidistant `t` (T,), of all joints of the model; `ctrl` (S, n) at `sent` (S,),
+    one for each actuator, from before the first t on.
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    sent: Array
+    ctrl: Array
+
+
+@dataclass(frozen=True)
+class SetPointErrors:
+    """`after` (H, m) RMS deviation [rad] (m) at each horizon (NaN where no log is so long).
+
+    `starts` (H,): of how many; `whole` (m,): over the whole log. `lost`: it left all bounds.
+    """
+
+    after: Array
+    starts: NDArray[np.intp]
+    whole: Array
+    lost: bool
+
+
+def set_point_errors(
+    xml: str, runs: Sequence[SetPointInput], delay: float, horizons: Sequence[float] = HORIZONS
+) -> SetPointErrors:
+    """Errors of the model `xml` (MJCF, whose actuators have no delay of their own) on `runs`."""
+    mujoco = load_mujoco()
+    model = mujoco.MjModel.from_xml_string(xml)
+    disabled = mujoco.mjtDisableBit.mjDSBL_LIMIT, mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    model.opt.disableflags |= int(disabled[0] | disabled[1])
+    squares, counts = np.zeros((len(horizons), model.nv)), np.zeros(len(horizons), np.intp)
+    total, samples, lost = np.zeros(model.nv), 0, False
+    with silent_engine():
+        for run in runs:
+            player = _Player(model, run, delay)
+            deviation = player.deviation(0, len(run.t) - 1)
+            lost |= bool((np.abs(deviation) >= _LOST).any())
+            total += np.square(deviation).sum(axis=0)
+            samples += len(deviation)
+            for h, horizon in enumerate(horizons):
+                count = round(horizon / player.period)
+                for first in _starts(runs, run, horizon, count):
+                    end = player.deviation(first, count)[-1]
+                    lost |= bool((np.abs(end) >= _LOST).any())
+                    squares[h] += np.square(end)
+                    counts[h] += 1
+    with np.errstate(invalid="ignore"):
+        after = np.sqrt(squares / np.where(counts > 0, counts, np.nan)[:, None])
+    return SetPointErrors(after, counts, np.sqrt(total / max(samples, 1)), lost)
+
+
+def _starts(
+    runs: Sequence[SetPointInput], run: SetPointInput, horizon: float, count: int
+) -> NDArray[np.intp]:
+    """Samples of `run` to begin at: its share of the starts of all runs."""
+    room = len(run.t) - 1 - count
+    if room < 0 or count < 1:
+        return np.zeros(0, np.intp)
+    most = max(1, min(_MOST_STARTS, int(_MOST_SECONDS / horizon)))
+    lengths = [each.t[-1] - each.t[0] for each in runs]
+    share = float((run.t[-1] - run.t[0]) / max(sum(lengths), 1e-9))
+    own = min(max(1, round(most * share)), room + 1)
+    return np.unique(np.linspace(0, room, own).round().astype(np.intp))
+
+
+class _Player:
+    """One run on a compiled model."""
+
+    def __init__(self, model: Any, run: SetPointInput, delay: float) -> None:
+        mujoco = load_mujoco()
+        self.run, self.delay, self.model = run, delay, model
+        self.period = float(run.t[-1] - run.t[0]) / (len(run.t) - 1)
+        self.data = mujoco.MjData(model)
+        self._kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
+        self._step = float(model.opt.timestep)
+
+    def deviation(self, first: int, count: int) -> Array:
+        """q_model − q_measured (count, m) at the `count` samples after `first`, where it begins."""
+        mujoco, run, model = load_mujoco(), self.run, self.model
+        substeps = max(1, int(np.ceil(self.period / self._step - _ROUNDING)))
+        told, model.opt.timestep = model.opt.timestep, self.period / substeps
+        try:
+            mujoco.mj_resetData(model, self.data)
+            self.data.qpos[:], self.data.qvel[:] = run.q[first], run.v[first]
+            state = np.empty(mujoco.mj_stateSize(model, self._kind))
+            mujoco.mj_getState(model, self.data, state, self._kind)
+            times = run.t[first] + np.arange(count * substeps) * model.opt.timestep
+            ctrl = run.ctrl[self._newest(times)]
+            whole = _CHUNK // substeps * substeps or substeps
+            found = []
+            for start in range(0, len(ctrl), whole):
+                states = self._played(state, ctrl[start : start + whole])
+                found.append(states[substeps - 1 :: substeps, 1 : 1 + model.nq])
+                state = states[-1]
+        finally:
+            model.opt.timestep = told
+        deviation = np.concatenate(found) - run.q[first + 1 : first + 1 + count]
+        return np.clip(np.nan_to_num(deviation, nan=_LOST), -_LOST, _LOST)
+
+    def _newest(self, times: Array) -> NDArray[np.intp]:
+        """The set point that acts at each of `times` (K,)."""
+        sent = np.searchsorted(self.run.sent, times - self.delay + _ROUNDING, side="right") - 1
+        return np.maximum(sent, 0)
+
+    def _played(self, state: Array, ctrl: Array) -> Array:
+        """States (K, size) after each of the physics steps."""
+        from mujoco import rollout
+
+        states, _ = rollout.rollout(self.model, self.data, state[None], ctrl[None])
+        return np.asarray(states[0])
