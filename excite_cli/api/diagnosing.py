@@ -82,7 +82,8 @@ def diagnose(
     problem = measured_case(problem)
     inputs = inputs_of(problem, *sources_of(data))
     with held({"output": output, "apply": apply}, overwrite, inputs), at_hand(workers):
-        problem, dataset = with_drive_law(problem, dataset_of(problem, data, tell), held_out, tell)
+        dataset = dataset_of(problem, data, tell)
+        problem, dataset, _ = with_drive_law(problem, dataset, held_out, tell)
         found = diagnose_dataset(
             problem.robot, robot_base(problem), dataset, problem.spec, held_out, progress, ended
         )

@@ -72,7 +72,8 @@ def identify(
     models = {"urdf": urdf, "mjcf": mjcf, "parameters": parameters}
     inputs = inputs_of(problem, *sources_of(data))
     with held({"output": output, **models}, overwrite, inputs), at_hand(workers):
-        problem, dataset = with_drive_law(problem, dataset_of(problem, data, tell), held_out, tell)
+        dataset = dataset_of(problem, data, tell)
+        problem, dataset, one_off = with_drive_law(problem, dataset, held_out, tell)
         suspicious = check_dataset(problem.robot, dataset, problem.spec, held_out)
         dataset = replace(dataset, findings=(*dataset.findings, *suspicious))
         tell_findings(suspicious, tell)
@@ -83,6 +84,7 @@ def identify(
             problem.spec,
             held_out,
             lambda text: progress(text, 0),
+            one_off,
         )
         for reason in found.processing.reasons:
             tell(Note(Level.DETAIL, reason))

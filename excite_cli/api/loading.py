@@ -29,7 +29,7 @@ from excite_cli.measurement.dataset import Dataset, Finding, merged
 from excite_cli.measurement.motors import motors_of
 from excite_cli.measurement.quality import raise_for_errors
 from excite_cli.measurement.torque import with_torques
-from excite_cli.measurement.torque_sources.command import law_of
+from excite_cli.measurement.torque_sources.command import Command, law_of
 from excite_cli.robot.description import is_named
 from excite_cli.robot.model import Array, Robot, build_measured_robot, build_robot
 from excite_cli.robot.overview import describe
@@ -388,25 +388,34 @@ def dataset_of(
 
 def with_drive_law(
     problem: Problem | Case, data: Dataset, held_out: str | None, tell: Tell
-) -> tuple[Problem | Case, Dataset]:
+) -> tuple[Problem | Case, Dataset, list[Dataset]]:
     """What the config leaves open of the drives' law found in the data, but for the held-out part.
+
+    And the data by laws one standard deviation off: if set points acted later, and if drives
+    answered at once.
 
     Raises
     ------
     ConfigError, FileError
         There is no such held-out run; a run is too short.
     """
-    if not is_sought(problem.spec.measurement):
-        return problem, data
     spec, robot = problem.spec, problem.robot
+    if spec.measurement.torque != Command.name:
+        return problem, data, []
+    joints = robot.joint_names[robot.base_joints :]
+    law = law_of(spec.measurement, joints)
+    at_once = replace(law, lag=0.0)
+    if not is_sought(spec.measurement):
+        return problem, data, [with_law(data, law, at_once)]
     training = split(data, held_out, spec.diagnosis.block, spec.identification.needed_runs).training
     found = find_law(robot, robot_base(problem), training, spec)
-    joints = robot.joint_names[robot.base_joints :]
     findings = found.findings(joints)
     tell_findings(findings, tell)
-    data = with_law(data, law_of(spec.measurement, joints), found.law)
+    data = with_law(data, law, found.law)
     data = replace(data, findings=(*data.findings, *findings))
-    return replace(problem, spec=found.told(spec, joints)), data
+    later = replace(found.law, delay=found.law.delay + (found.delay_std or 0.0))
+    one_off = [with_law(data, found.law, each) for each in (later, replace(found.law, lag=0.0))]
+    return replace(problem, spec=found.told(spec, joints)), data, one_off
 
 
 def tell_findings(findings: Iterable[Finding], tell: Tell) -> None:

@@ -130,6 +130,11 @@ class DriveLawSpec(Section):
     delay: NonNegative | None = Field(
         None, description="[s] after which a set point acts; default: found in the data"
     )
+    period: NonNegative = Field(
+        1e-3,
+        description="[s] of the drive's own loop, whose torque answers positions half of it later, "
+        "give or take as much",
+    )
     limit: PerJoint | None = Field(None, description="[N·m] at which the drive's torque stops")
 
 

@@ -1,11 +1,12 @@
 """Robots without torque sensors: what the position controller of their drives applies.
 
-    τ(t) = kp (q*(t − d) − q(t)) + kd (v*(t − d) − v(t)) + τ_ff(t − d),    |τ| ≤ limit
+    τ(t) = kp (q*(t − d) − q(t − ε)) + kd (v*(t − d) − v(t − ε)) + τ_ff(t − d),    |τ| ≤ limit
 
 with set points q* (speeds v* and torques τ_ff, where the drive takes any) that act the time d after
 they were recorded, and gains kp [N·m/rad], kd [N·m·s/rad] at the joint. A set point stands until
 the next one comes; what a joint feels over a sample is its average, which is q* interpolated half a
-sample later.
+sample later. In the same way ε is half a period of the drive's own loop: kp ε of its damping, and
+kd ε of a rotor, are taken away by that.
 """
 
 from collections.abc import Mapping
@@ -23,12 +24,16 @@ UNKNOWN_GAIN = 1.0
 
 @dataclass(frozen=True)
 class DriveLaw:
-    """`kp` [N·m/rad], `kd` [N·m·s/rad], `limit` [N·m] (∞ without one), each (n,); `delay` [s]."""
+    """`kp` [N·m/rad], `kd` [N·m·s/rad], `limit` [N·m] (∞ without one), each (n,).
+
+    `delay` d of set points and `lag` ε of what the drive answers [s].
+    """
 
     kp: Array
     kd: Array
     limit: Array
     delay: float
+    lag: float = 0.0
 
     def torque(self, run: Run) -> Array:
         """τ (T, n) [N·m] that the drives apply in a run with set points in its `extra`.
@@ -37,8 +42,9 @@ class DriveLaw:
         """
         late, driven = held(run, self.delay), slice(run.base_rows, None)
         tau = np.zeros_like(run.q)
-        own = self.kp * (late["q_cmd"] - run.q[:, driven])
-        own += self.kd * (late.get("v_cmd", 0.0) - speeds_of(run)[:, driven])
+        q, v = (_earlier(x[:, driven], run.t, self.lag) for x in (run.q, speeds_of(run)))
+        own = self.kp * (late["q_cmd"] - q)
+        own += self.kd * (late.get("v_cmd", 0.0) - v)
         own += late.get("tau_ff", 0.0)
         tau[:, driven] = np.clip(own, -self.limit, self.limit)
         return tau
@@ -60,9 +66,17 @@ def held(run: Run, delay: float) -> Mapping[str, Array]:
     found = {}
     for name in (*Command.channels, *Command.further):
         if name in run.extra:
-            columns = [np.interp(at, run.t, column) for column in run.extra[name].T]
-            found[name] = np.stack(columns, axis=1)
+            found[name] = _at(at, run.t, run.extra[name])
     return found
+
+
+def _earlier(x: Array, t: Array, lag: float) -> Array:
+    return _at(t - lag, t, x) if lag else x
+
+
+def _at(times: Array, t: Array, x: Array) -> Array:
+    """Columns x (T, n) at other times."""
+    return np.stack([np.interp(times, t, column) for column in x.T], axis=1)
 
 
 def law_of(spec: MeasurementSpec, joints: tuple[str, ...]) -> DriveLaw:
@@ -73,6 +87,7 @@ def law_of(spec: MeasurementSpec, joints: tuple[str, ...]) -> DriveLaw:
         per_joint(told.kd, joints, 0.0),
         per_joint(told.limit, joints, np.inf),
         told.delay or 0.0,
+        0.5 * told.period,
     )
 
 

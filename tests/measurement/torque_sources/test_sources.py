@@ -25,7 +25,7 @@ def sent(ahead: float = 0.1, **extra: Any) -> Run:
 
 
 def by_law(run: Run, **command: Any) -> Run:
-    spec = MeasurementSpec(torque="command", command=command)
+    spec = MeasurementSpec(torque="command", command={"period": 0.0, **command})
     return to_joints(run, spec, JOINTS, TURNS)
 
 
@@ -55,13 +55,23 @@ def test_set_points_act_later_and_stand_until_the_next() -> None:
     assert np.abs(held(run, 0.0)["q_cmd"] - then)[10:].max() > 0.01
 
 
+def test_the_drive_answers_half_of_its_period_later() -> None:
+    run = sent()
+    tau = by_law(run, kp=20.0, kd=1.5, delay=0.0, period=0.02).tau
+    before = motion(run.t - 0.01)
+    half = motion(run.t + 0.1 - 0.5 * run.step)[0]
+    assert run.dq is not None
+    law = 20.0 * (half - before[0]) - 1.5 * before[1]
+    assert np.abs(tau - law)[10:].max() < 0.1  # noise of the recorded speeds
+
+
 def test_set_points_have_the_units_of_positions() -> None:
     run = sent()
     degrees = replace(
         run, q=np.degrees(run.q), dq=None, extra={"q_cmd": np.degrees(run.extra["q_cmd"])}
     )
     spec = MeasurementSpec(
-        torque="command", command={"kp": 20.0}, angle="deg", position_sign={"elbow": -1},
+        torque="command", command={"kp": 20.0, "period": 0.0}, angle="deg", position_sign={"elbow": -1},
         offset={"wrist": 0.2},
     )  # fmt: skip
     found = to_joints(degrees, spec, JOINTS, TURNS)
@@ -112,7 +122,7 @@ def table(path: Path, run: Run, *channels: str) -> Path:
 
 def test_columns_of_a_file(tmp_path: Path) -> None:
     run = sent()
-    told = {"torque": "command", "command": {"kp": 20.0, "delay": 0.0}}
+    told = {"torque": "command", "command": {"kp": 20.0, "delay": 0.0, "period": 0.0}}
     (found,) = read(table(tmp_path / "a.csv", run, "q_cmd"), **told).runs
     law = by_law(replace(run, dq=None), kp=20.0, delay=0.0).tau
     np.testing.assert_allclose(found.tau, law, atol=1e-5)
