@@ -9,13 +9,15 @@ which no torque says anything, the prior knows as much as it did:
 with δ_B the deviation of the base parameters, Σ that of the prior and z white. Then mapping φ has
 just the covariance of the fit. Of these models only those exist whose bodies are some mass
 distribution and whose friction and armature are not negative. They are drawn by elliptical slice
-sampling (Murray, Adams & MacKay 2010): from x to x̂ + (x − x̂) cos α + B z sin α, with α drawn anew
-from a smaller and smaller arc until that one exists. No draw is moved to the border for it.
+sampling (Murray, Adams & MacKay 2010) of w in x = x̂ + B w, a few of its numbers at a time: from w
+to w cos α + z sin α with z white, and α drawn anew from a smaller and smaller arc until that model
+exists. No draw is moved to the border for it.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.inertial_prior import InertialPrior
@@ -28,8 +30,9 @@ from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.robot.model import Array
 
 _MARGIN = 1e-6  # kg per kg of the mean mass of a body: least eigenvalue of one that exists
-_THINNING = 200  # steps from a model to the next that counts
-_BEGINNING = 2000  # steps until the model that is begun with is forgotten
+_BLOCK = 2  # numbers of w that move together: the more, the smaller the arcs
+_SWEEPS = 12  # from a model to the next that counts
+_BEGINNING = 5  # models until the one that is begun with is forgotten
 _SMALLEST_ARC = 1e-9  # rad
 
 
@@ -64,36 +67,28 @@ class UncertainModel:
 
     def exists(self, x: Array) -> bool:
         """Whether bodies are some mass distribution, and signs are as they must be."""
-        return self._possible(self._signed(x), self._scaled(x))
+        return _Limits(self._signed(x), self._scaled(x).ravel()).kept
 
     def drawn(self, count: int, seed: int) -> Array:
         """Models (count, P + k) that exist; the same `seed` gives the same."""
         rng = np.random.default_rng([seed, 7])
-        x, found = self.numbers - self.center, np.empty((count, len(self.center)))
-        fixed = self._signed(self.center), self._scaled(self.center)
-        for _ in range(_BEGINNING):
-            x = self._step(x, fixed, rng)
-        for k in range(count):
-            for _ in range(_THINNING):
-                x = self._step(x, fixed, rng)
-            found[k] = self.center + x
+        gap = self.numbers - self.center
+        w: Array = np.asarray(np.linalg.lstsq(self.root, gap, rcond=None)[0], dtype=float)
+        # Linear in w are what must not be negative, and the bodies: one row for each column of B.
+        signed = np.array([self._signed(column) for column in self.root.T])
+        bodies = np.array([self._scaled(column).ravel() for column in self.root.T])
+        begin = self.numbers - self.root @ w  # the model's, where B does not reach it
+        fixed = _Limits(self._signed(begin), self._scaled(begin).ravel())
+        blocks = np.array_split(np.arange(len(w)), -(-len(w) // _BLOCK))
+        found = np.empty((count, len(gap)))
+        for k in range(-_BEGINNING, count):
+            here = fixed.plus(w @ signed, w @ bodies)
+            for _ in range(_SWEEPS):
+                for block in blocks:
+                    here = _turned(w, block, here, signed[block], bodies[block], rng)
+            if k >= 0:
+                found[k] = begin + self.root @ w
         return found
-
-    def _step(self, x: Array, fixed: tuple[Array, Array], rng: np.random.Generator) -> Array:
-        """From one deviation to the next; `fixed`: signed numbers and bodies of the center."""
-        other = self.root @ rng.normal(size=self.root.shape[1])
-        signs = self._signed(x), self._signed(other)
-        bodies = self._scaled(x), self._scaled(other)
-        angle = rng.uniform(0.0, 2.0 * np.pi)
-        low, high = angle - 2.0 * np.pi, angle
-        while high - low > _SMALLEST_ARC:
-            c, s = np.cos(angle), np.sin(angle)
-            signed = fixed[0] + c * signs[0] + s * signs[1]
-            if self._possible(signed, fixed[1] + c * bodies[0] + s * bodies[1]):
-                return np.asarray(c * x + s * other)
-            low, high = (angle, high) if angle < 0.0 else (low, angle)
-            angle = rng.uniform(low, high)
-        return x
 
     def _signed(self, x: Array) -> Array:
         """Those of x that must not be negative."""
@@ -105,10 +100,55 @@ class UncertainModel:
         d[:, :3] /= self.lengths[:, None]
         return np.asarray(pseudo_inertias(self.bodies(x)) * d[:, :, None] * d[:, None, :])
 
-    def _possible(self, signed: Array, bodies: Array) -> bool:
-        if (signed < 0.0).any():
+
+@dataclass(frozen=True)
+class _Limits:
+    """What decides whether a model exists: numbers that must not be negative, and its bodies.
+
+    These are scaled pseudo-inertias (16·bodies,).
+    """
+
+    signed: Array
+    bodies: Array
+
+    def plus(self, signed: Array, bodies: Array) -> "_Limits":
+        return _Limits(self.signed + signed, self.bodies + bodies)
+
+    @property
+    def kept(self) -> bool:
+        if self.signed.size and self.signed.min() < 0.0:
             return False
-        return bool(np.linalg.eigvalsh(bodies)[:, 0].min() > 0.0)
+        try:
+            np.linalg.cholesky(self.bodies.reshape(-1, 4, 4))
+        except np.linalg.LinAlgError:
+            return False
+        return True
+
+
+def _turned(
+    w: Array,
+    block: NDArray[np.intp],
+    here: _Limits,
+    signed: Array,
+    bodies: Array,
+    rng: np.random.Generator,
+) -> _Limits:
+    """Move the numbers `block` of w on an ellipse, all others fixed; what decides there."""
+    own, other = w[block], rng.normal(size=len(block))
+    own_signed, other_signed = own @ signed, other @ signed
+    own_bodies, other_bodies = own @ bodies, other @ bodies
+    rest = here.plus(-own_signed, -own_bodies)
+    angle = rng.uniform(0.0, 2.0 * np.pi)
+    low, high = angle - 2.0 * np.pi, angle
+    while high - low > _SMALLEST_ARC:
+        c, s = np.cos(angle), np.sin(angle)
+        tried = rest.plus(c * own_signed + s * other_signed, c * own_bodies + s * other_bodies)
+        if tried.kept:
+            w[block] = c * own + s * other
+            return tried
+        low, high = (angle, high) if angle < 0.0 else (low, angle)
+        angle = rng.uniform(low, high)
+    return here
 
 
 def from_covariance(base: BaseParameters, prior: InertialPrior, covariance: Array) -> Array:

@@ -97,7 +97,9 @@ def test_mjlab(delay: float, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_names_are_no_patterns(monkeypatch: pytest.MonkeyPatch) -> None:
     odd = JointValues(("a.b", *ur10().joint_names[1:]), drive(), *np.zeros((3, 6)))
     assert run(mjlab('"odd" \\', odd).text, monkeypatch)[0].target_names_expr == (r"a\.b",)
-    assert r"a\.b" in run(isaaclab("odd", odd).text, monkeypatch)["drives"].stiffness
+    drives = run(isaaclab("odd", odd).text, monkeypatch)["drives"]
+    assert r"a\.b" in drives.stiffness
+    assert drives.joint_names_expr[0] == r"a\.b"
 
 
 def test_what_is_not_in_them_is_reported() -> None:

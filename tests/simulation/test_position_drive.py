@@ -5,9 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.errors import ConfigError, RobotError
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
+from excite_cli.simulation.build import assemble
 from excite_cli.simulation.position_drive import PositionDrive, parse_gains
+from excite_cli.simulation.set_point_control import SetPointControl
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import Simulation
 from tests.simulation.arms import (
@@ -112,13 +116,17 @@ def test_torque_limits_are_those_of_the_drive(robot: Robot) -> None:
 
 
 def test_the_drive_knows_what_its_encoder_counts(robot: Robot) -> None:
-    """What a step hides is what the drive does not correct."""
-    step = 2e-2
-    (run,) = played(robot, settings=replace(QUICK, encoder=step)).dataset.runs
-    counts = run.q / step
-    assert np.allclose(counts, np.round(counts))
-    fine = played(robot, settings=QUICK).dataset.runs[0]
-    assert rms(run.q - fine.q).max() > step / np.sqrt(12), "the motion itself is another"
+    step = 0.05
+    build = assemble(robot, standard_parameters(robot), RunId("a"), ())
+    t = np.arange(10) / 1000.0
+    control = SetPointControl(DRIVE, build, motion(robot), t, step)
+    q, v = np.linspace(-1.01, 0.93, 6), np.linspace(0.3, -0.2, 6)
+    wanted, _ = DRIVE.set_points(motion(robot), t[3:4] - DRIVE.delay)
+    counted = np.round(q / step) * step
+    law = np.array(KP) * (wanted[0] - counted) - np.array(KD) * v
+    np.testing.assert_allclose(control.torque(3, q, v), law)
+    (run,) = played(robot, settings=replace(QUICK, encoder=step, lead_in=0.1)).dataset.runs
+    assert np.allclose(run.q / step, np.round(run.q / step)), "and so does the log"
 
 
 def test_the_law_may_be_wrong_by_gain_and_offset(robot: Robot) -> None:
