@@ -125,7 +125,7 @@ class DriveLawSpec(Section):
         None, description="[N·m/rad] at the joint; default: found in the data, by the URDF's masses"
     )
     kd: PerJoint = Field(
-        0.0, description="[N·m·s/rad] at the joint; what is not told stays in viscous friction"
+        0.0, description="[N·m·s/rad] at the joint; what is not given stays in viscous friction"
     )
     delay: NonNegative | None = Field(
         None, description="[s] after which a set point acts; default: found in the data"

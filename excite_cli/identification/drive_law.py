@@ -99,7 +99,7 @@ class FoundLaw:
             ]
             text = (
                 f"gains kp of the drives [N·m/rad] were found: {', '.join(each)}. Their scale is "
-                "that of the URDF's masses; tell them if they are known (measurement.command.kp)"
+                "that of the URDF's masses; if they are known, give them (measurement.command.kp)"
             )
             kp = {name: float(f"{x:.4g}") for name, x in zip(joints, self.law.kp, strict=True)}
             settings_of_kp = {"measurement.command.kp": kp}
