@@ -104,7 +104,7 @@ def closed(loop: Loop, folder: Folder) -> Record:
     measured = ("--measure", "simulate", "--from-speed", str(loop.from_speed), *robot)
     resume = ("--resume",) if (folder.place / "campaign" / "campaign.json").exists() else ()
     whole = folder.excite("campaign", config, *measured, *settings, *resume, good=(0, 1))
-    wanted = ceil(whole["seconds"] / problem.trajectory.duration)
+    wanted = ceil(whole["seconds"] / problem.trajectory.duration - 1e-6)
     count = max(_FIRST, whole["motions"] if loop.by_motions else wanted)
     folder.excite(*plain, "--motions", str(count), "--resume")
     like = folder.place / "plain.h5"

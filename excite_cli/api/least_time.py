@@ -104,26 +104,25 @@ def in_least_time(problem: Problem, begun: Result, run: Run, tell: Tell) -> Foun
 
     `begun`: without motions, or with the first one of the problem's own duration.
     """
-    longest, best = problem.trajectory.duration, None
-    last = Found(problem, run(problem, begun, most=1))
-    for _ in range(_TRIES):
+    longest = problem.trajectory.duration
+    last, best = Found(problem, run(problem, begun, most=1)), None
+    for tries in range(_TRIES + 1):
         at, result = last.problem, last.result
         goals = Goals(at).of(result)
-        if best is last and max(goal.needed for goal in goals) > _CLOSE:
-            break
+        needed = max(goal.needed for goal in goals)
+        if needed <= 1.0 and (best is None or _seconds(last) < _seconds(best)):
+            best = last
         count, duration = _wanted(at, goals, len(result.motions), longest)
-        seconds = count * duration
-        if count == 0 or (best is not None and seconds >= _seconds(best)):
+        better = best is None or count * duration < _seconds(best)
+        if tries == _TRIES or count == 0 or not better or (best is last and needed > _CLOSE):
             break
         words = f"{count} motion{'s' * (count > 1)} of {duration:.4g} s"
         tell(Note(Level.INFO, f"sequence.until: {words} should be enough"))
-        new = of_duration(problem, duration)
+        new, stored = of_duration(problem, duration), best is None
         starts = load_motions(at, result) if len(result.motions) == count else ()
-        stored = best is None
-        found = run(new, _without_motions(begun, new), count, starts, stored)
+        same = new is at and len(result.motions) < count
+        found = run(new, result if same else _without_motions(begun, new), count, starts, stored)
         last = Found(new, found, stored)
-        if Goals(new).reached(found) and (best is None or _seconds(last) < _seconds(best)):
-            best = last
     return best or Found(last.problem, run(last.problem, last.result))
 
 

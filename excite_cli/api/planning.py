@@ -183,7 +183,8 @@ def plan(
     with held_result(path, overwrite, resume, read):
         tell_idle(1 if workers is None else workers.count, model.restarts, tell)
         at, result = _begun(model, following, priors, path if resume else None, tell)
-        if at is not model or following or result.priors or not duration_is_free(model.spec):
+        fixed = following is not None or not duration_is_free(model.spec)
+        if fixed or at is not model or result.priors or len(result.motions) > 1:
             return run(at, result)
         found = in_least_time(model, result, run, tell)
         if path is not None and not found.stored:

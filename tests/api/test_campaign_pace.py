@@ -22,15 +22,36 @@ def problem() -> Problem:
 
 
 def test_the_deviation_is_that_of_models_drawn_from_what_the_data_say(problem: Problem) -> None:
+    """What is only possible has no more than its share of the usual torque, at no instant."""
     prediction, stack = prediction_of(problem), stacked(problem, 1, 2)
     times: Array = np.linspace(0.0, 5.0, 7)
     states = problem.trajectory.states(times, drawn(problem, 0.3, 5))
-    covariance = np.linalg.inv(prediction.information(stack.factor))
-    z = np.random.default_rng(1).multivariate_normal(np.zeros(len(covariance)), covariance, 20_000)
     rows = problem.objective().block_of(times, *states)
-    torques = (z @ rows.T).reshape(len(z), len(times), -1) / problem.weighting.rows
+    torques = rows.reshape(len(times), problem.robot.n, -1) / problem.weighting.rows[:, None]
+    usual = prediction.usual[:, None] * prediction.shares
+    peaks = np.max(np.abs(torques[:, :, prediction.rank :]) / usual, axis=(0, 1))
+    precision = prediction.information(stack.factor)
+    for k, peak in enumerate(peaks, start=prediction.rank):
+        precision[k, k] += max(peak, 1.0) ** 2 - 1.0
+    assert max(peaks) > 3.0
+    covariance = np.linalg.inv(precision)
+    z = np.random.default_rng(1).multivariate_normal(np.zeros(len(covariance)), covariance, 20_000)
+    drawn_ = np.einsum("tjc,zc->ztj", torques, z)
     found = torque_deviation((problem, stack), times, states)
-    np.testing.assert_allclose(found, torques.std(axis=0), rtol=0.03)
+    np.testing.assert_allclose(found, drawn_.std(axis=0), rtol=0.03)
+
+
+def test_the_prior_of_what_the_model_has_stays_as_wide_as_it_is() -> None:
+    narrow = "{kind: stribeck_friction, joints: [elbow], shape: {stribeck_speed: 0.002}}"
+    declared = smoke("criterion.kind=predicted_torque", f"effects=[{narrow}]")
+    times: Array = np.linspace(0.0, 6.0, 3001)
+    states = declared.trajectory.states(times, drawn(declared, 0.3, 5))
+    nothing = Stack.empty(declared.columns)
+    prediction = prediction_of(declared)
+    own = int(prediction.first_columns[0])
+    column = declared.objective().block_of(times, *states)[:, own]
+    alone = np.abs(column.reshape(len(times), -1) / declared.weighting.rows).max()
+    assert torque_deviation((declared, nothing), times, states).max() > 0.99 * alone
 
 
 class _Urdf(Model):
