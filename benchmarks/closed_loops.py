@@ -3,8 +3,8 @@
     python -m benchmarks.closed_loops [--only WORD …] [--folder FOLDER] [--page docs/campaigns.md]
 
 Five robots, each with inertias 10–30 % off its description and three effects that its config does
-not declare. Campaigns begin at a fraction of the motions' pace, and one effect does not show there:
-a torque that saturates. Beside each campaign: as many motions, planned in one go, as its seconds
+not declare. Campaigns begin within a share of the limits, and one effect does not show there: a
+torque that saturates. Beside each campaign: as many motions, planned in one go, as its seconds
 allow (`plain`), and random ones (`random`), at their own pace, diagnosed once. All models are then
 judged on two held-out random motions: the error of their torque where joints move.
 Every command is one that a user types. One file per robot, so that a run can be resumed.
@@ -45,32 +45,31 @@ Record = dict[str, Any]
 
 @dataclass(frozen=True)
 class Loop:
-    """A robot: its config (or what `init` is given), and effects as `--effect` takes them.
+    """A robot: what `init` is given (or its config), and effects as `--effect` takes them.
 
-    One more is put in: the torque of a joint saturates at a level that the motions pass at their
-    own pace and not at that of the first round (`late_effect`).
+    One more is put in: the torque of a joint saturates at a level that the motions pass at full
+    pace and not in the first round (`late_effect`).
     """
 
     name: str
-    config: str
+    config: tuple[str, ...]
     effects: tuple[str, ...]
     from_speed: float = 0.4
     more: tuple[str, ...] = ()
     by_motions: bool = False  # as many motions beside it, not seconds: they take minutes to plan
 
 
+_ARMS = [f"arm_{side}_{k}_joint" for side in ("left", "right") for k in range(1, 8)]
 LOOPS = (
-    Loop("UR10", "configs/ur10.yaml",
+    Loop("UR10", ("--robot", "ur10"),
          ("load_dependent_friction@elbow_joint=0.06", "spring@wrist_1_joint=4")),
-    Loop("Panda", "configs/panda.yaml",
+    Loop("Panda", ("--robot", "panda"),
          ("ripple@panda_joint2=1.5,periods:20", "torque_offset@panda_joint4=0.8")),
-    # At rest, as the message says where a posture has no way into a motion.
-    Loop("TALOS' arms", "configs/talos_arms.yaml",
-         ("coulomb_friction@arm_left_4_joint=1.5", "spring@arm_right_2_joint=4"),
-         more=("--set", "trajectory.at_rest=true")),
-    Loop("bench arm (MJCF)", "data/bench_arm.xml",
+    Loop("TALOS' arms", ("--robot", "talos", "--joints", ",".join(_ARMS)),
+         ("coulomb_friction@arm_left_4_joint=1.5", "spring@arm_right_2_joint=4")),
+    Loop("bench arm (MJCF)", ("--urdf", str(ROOT / "data/bench_arm.xml")),
          ("stribeck_friction@shoulder=4", "spring@pitch=2")),
-    Loop("standing TALOS", "configs/talos_base.yaml",
+    Loop("standing TALOS", ("configs/talos_base.yaml",),
          ("base_tilt@all=0.01,pitch:0.0524", "coulomb_friction@arm_left_1_joint=2"),
          more=("--set", "robot.rows=[base, joints]"), by_motions=True),
 )  # fmt: skip
@@ -96,12 +95,16 @@ def closed(loop: Loop, folder: Folder) -> Record:
     plain = ("optimize", config, *settings, "-o", "plain.h5")
     if not (folder.place / "plain.h5").exists():
         folder.excite(*plain, "--motions", str(_FIRST))
-    effects = (*loop.effects, late_effect(problem, folder.place / "plain.h5", loop.from_speed))
+    first = ("--set", f"constraints.joint_limits.pace={loop.from_speed}", "-o", "slow.h5")
+    if not (folder.place / "slow.h5").exists():
+        folder.excite(*plain[:-2], *first, "--motions", str(_FIRST))
+    plans = (folder.place / f"{name}.h5" for name in ("slow", "plain"))
+    effects = (*loop.effects, late_effect(problem, *plans))
     robot = tuple(word for text in effects for word in ("--effect", text))
     measured = ("--measure", "simulate", "--from-speed", str(loop.from_speed), *robot)
     resume = ("--resume",) if (folder.place / "campaign" / "campaign.json").exists() else ()
     whole = folder.excite("campaign", config, *measured, *settings, *resume, good=(0, 1))
-    wanted = ceil(whole["seconds"] / problem.trajectory.duration)
+    wanted = ceil(whole["seconds"] / problem.trajectory.duration - 1e-6)
     count = max(_FIRST, whole["motions"] if loop.by_motions else wanted)
     folder.excite(*plain, "--motions", str(count), "--resume")
     like = folder.place / "plain.h5"
@@ -136,27 +139,27 @@ def closed(loop: Loop, folder: Folder) -> Record:
     }
 
 
-def late_effect(problem: Problem, plan: Path, pace: float) -> str:
-    """Saturation of a joint between its largest torque in the motions at `pace` and at their own.
+def late_effect(problem: Problem, slow: Path, own: Path) -> str:
+    """Saturation of a joint between its largest torques in motions of a first round and at full.
 
     Of the joint where these differ most, by the description's inertias.
     """
     dynamics, times = InverseDynamics(problem.robot), problem.constraint_basis.times
-    slow, own = (
+    below, above = (
         np.max(
             [
-                np.abs(dynamics.torques(q, s * v, s**2 * a)).max(axis=0)
+                np.abs(dynamics.torques(q, v, a)).max(axis=0)
                 for each in motions_of(read_result(plan))
                 for q, v, a in [each.trajectory.states(times, each.coefficients)]
             ],
             axis=0,
         )
-        for s in (pace, 1.0)
+        for plan in (slow, own)
     )
     names = problem.robot.joint_names
-    rows = [j for j in range(len(names)) if own[j] > 1.0]
-    joint = max(rows, key=lambda j: own[j] / slow[j])
-    return f"torque_saturation@{names[joint]}={float(np.sqrt(slow[joint] * own[joint])):.3g}"
+    rows = [j for j in range(len(names)) if above[j] > 1.0]
+    joint = max(rows, key=lambda j: above[j] / below[j])
+    return f"torque_saturation@{names[joint]}={float(np.sqrt(below[joint] * above[joint])):.3g}"
 
 
 def planted(record: Record) -> list[Name]:
@@ -166,11 +169,11 @@ def planted(record: Record) -> list[Name]:
 
 
 def _config(loop: Loop, folder: Folder) -> str:
-    """The config in the folder; `init` makes it where there is none."""
-    if loop.config.endswith(".xml"):
-        folder.excite("init", "--urdf", str(ROOT / loop.config), "-o", "robot.yaml", "--overwrite")
+    """The config in the folder, as `init` makes it where there is none."""
+    if len(loop.config) > 1:
+        folder.excite("init", *loop.config, "-o", "robot.yaml", "--overwrite")
         return "robot.yaml"
-    text = (ROOT / loop.config).read_text(encoding="utf-8")
+    text = (ROOT / loop.config[0]).read_text(encoding="utf-8")
     (folder.place / "robot.yaml").write_text(text.replace("../data", str(ROOT / "data")))
     return "robot.yaml"
 

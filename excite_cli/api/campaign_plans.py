@@ -4,8 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from excite_cli.api.campaign_pace import within_torque
 from excite_cli.api.identifying import identify
 from excite_cli.api.loading import Case, load_case, measured_case, problem_of
+from excite_cli.api.model import load_model
+from excite_cli.api.motions import load_motions
 from excite_cli.api.planning import Planned, PlanProgress, plan, plan_after
 from excite_cli.campaign.records import (
     Campaign,
@@ -16,9 +19,12 @@ from excite_cli.campaign.records import (
     pace_of,
 )
 from excite_cli.config.data_spec import EffectSpec
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.config.spec import Spec
+from excite_cli.config.trajectory_spec import FourierSpec
 from excite_cli.diagnosis.candidates import effect_of
 from excite_cli.diagnosis.records import EffectRecord
+from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.extension import why_not_planned
 from excite_cli.excitation.invariant import design_for, invariants
 from excite_cli.excitation.problem import Problem
@@ -27,10 +33,13 @@ from excite_cli.excitation.stack import Stack
 from excite_cli.robot.model import Robot
 from excite_cli.shown.note import Level, Note, Tell
 from excite_cli.store.diagnosis_file import read_diagnosis
+from excite_cli.store.result_file import read_result
 from excite_cli.summary.motions import motion_sentence
 from excite_cli.workers.base import Workers
 
 MODEL = "model.yaml"
+_FIRST = "round_1.h5"
+_FEWEST_FROM_REST = 3  # harmonics
 _FEWEST = 3  # motions of the first round: two are fitted, so that names rest on more than one
 
 
@@ -63,30 +72,60 @@ class RoundPlans:
         """Motions for the model as it is declared."""
         count = max(self.case.spec.sequence.motions or _FEWEST, _FEWEST)
         pace = pace_of(1, state.asked.from_speed)
-        problem = self._problem(at_pace(pace, self.case.spec), 1, count)
-        path = self.folder / "round_1.h5"
+        spec, path = at_pace(pace, self.case.spec), self.folder / _FIRST
         self._say(f"round 1: {count} motions")
-        result = self._planned(problem, path)
+        problem = self._problem(from_rest(spec) if state.asked.entry else spec, 1, count)
+        try:
+            result = self._planned(problem, path)
+        except NoAdmissibleMotionError:  # the posture leaves no room to begin and end there
+            problem = self._problem(spec, 1, count)
+            result = self._planned(problem, path)
         motions = self._motions(1, "first", path, result, pace)
         return CampaignRound(1, motions, efficiency=_efficiency(problem, result))
 
     def following(self, state: Campaign, number: int) -> CampaignRound:
-        """A motion for what is known, and one for what is not."""
+        """A motion for what is known, and one for what is not.
+
+        At full pace as soon as nothing is open and the torques of the model allow it, else twice
+        as fast as the round before.
+        """
+        last, pace = state.rounds[-1], pace_of(number, state.asked.from_speed)
+        if last.pace >= 1.0 or pace >= 1.0:
+            return self._round(state, number, 1.0, f"round_{number}")
+        if last.learned is not None and not last.learned.open:
+            found = self._round(state, number, 1.0, f"round_{number}")
+            if self._allowed(found, number):
+                self._say(f"round {number}: full pace, within the limits of torque by 3 σ")
+                return found
+        return self._round(state, number, pace, f"round_{number}_slower")
+
+    def _allowed(self, planned: CampaignRound, number: int) -> bool:
+        """Whether the model of the round before keeps the limits of torque in these motions."""
+        path = self.folder / diagnosis_of(number - 1)
+        known = plan_after(self.case, path, tell=lambda note: None).known
+        motions = [
+            motion
+            for each in planned.motions
+            for motion in load_motions(self.case, self.folder / each.plan, (each.index,))
+        ]
+        return known is not None and within_torque(load_model(path), known, motions)
+
+    def _round(self, state: Campaign, number: int, pace: float, name: str) -> CampaignRound:
+        """The motions of a round at this pace; its plans are called `name`."""
         found = self.folder / diagnosis_of(number - 1)
-        pace = pace_of(number, state.asked.from_speed)
         spec = at_pace(pace, self._with_fit(state))
         known, unseen = self._effects(found)
         alone = state.asked.plain or not unseen
         case = replace(self.case, spec=_of(spec, number, 2 if alone else 1))
         following = plan_after(case, found, tell=lambda note: None)
         self._say(f"round {number}: {following.messages[0]}")
-        path = self.folder / f"round_{number}.h5"
+        path = self.folder / f"{name}.h5"
         result = self._planned(following, path)
         efficiency = _efficiency(following.model, result)
         purpose: Purpose = "separate" if following.purpose == "separate" else "excite"
         motions = self._motions(number, purpose, path, result, pace)
         if not alone:
-            path = self.folder / f"round_{number}_explore.h5"
+            path = self.folder / f"{name}_explore.h5"
             problem = self._problem(_showing(spec, (*known, *unseen)), number, 1)
             what = f"exploration motion for {len(unseen)} untested candidate effects"
             self._say(f"round {number}: {what}")
@@ -149,8 +188,12 @@ class RoundPlans:
         )
 
     def _with_fit(self, state: Campaign) -> Spec:
-        """The config, its torques bounded for the uncertainty of the inertias that is left."""
-        spec = self.case.spec
+        """The config with the trajectory of the first round.
+
+        Its torques are bounded for the uncertainty of the inertias that is left.
+        """
+        first = parse_spec(read_result(self.folder / _FIRST).config, f"the config in {_FIRST}")
+        spec = self.case.spec.model_copy(update={"trajectory": first.trajectory})
         # A fit of a robot whose base is measured has other rows than a motion: what the config
         # says of the inertias stays, which is wider.
         if spec.uncertainty is None or measured_case(self.case).robot.base_joints:
@@ -183,11 +226,40 @@ def _of(spec: Spec, number: int, motions: int) -> Spec:
 
 
 def at_pace(pace: float, spec: Spec) -> Spec:
-    """The config for motions that are played at `pace`, so that none needs its own to hold."""
+    """The config for motions that keep this share of the limits of speed, acceleration and jerk.
+
+    Planned for it they are no longer than at full pace, as motions that are slowed down are. Where
+    no limits of joints are kept, they are slowed, and planned so that none needs its speed to hold.
+    """
     if pace >= 1.0:
         return spec
-    constraints = spec.constraints.model_copy(update={"any_speed": True})
-    return spec.model_copy(update={"constraints": constraints})
+    limits = spec.constraints.joint_limits
+    if limits is None:
+        change: dict[str, object] = {"any_speed": True}
+    else:
+        change = {"joint_limits": limits.model_copy(update={"pace": pace * limits.pace})}
+    return spec.model_copy(update={"constraints": spec.constraints.model_copy(update=change)})
+
+
+def from_rest(spec: Spec) -> Spec:
+    """The config for motions that begin and end at rest at its posture, and need no way there.
+
+    The ways into motions and back are half of the seconds of a campaign without it, and a motion
+    from rest is as good. One that begins at a posture of the config's own stays.
+    """
+    trajectory = spec.trajectory
+    least = _FEWEST_FROM_REST
+    if isinstance(trajectory, FourierSpec):
+        few = trajectory.harmonics is not None and trajectory.harmonics < least
+        ends: dict[str, object] = {"start": "posture"}
+    else:
+        points = trajectory.control_points
+        few = points is not None and points < trajectory.degree + least + 4
+        ends = {"start": "posture", "end": "posture"}
+    if few or trajectory.start is not None:
+        return spec
+    new = trajectory.model_copy(update={"at_rest": True, **ends})
+    return spec.model_copy(update={"trajectory": new})
 
 
 def _showing(spec: Spec, effects: tuple[EffectSpec, ...]) -> Spec:

@@ -19,6 +19,8 @@ from excite_cli.shown.note import Level, Note, Tell
 from excite_cli.store.result_file import read_result
 from excite_cli.summary.pairs import doubts_in_words
 
+_ROUNDING = 1e-9
+
 
 @dataclass(frozen=True)
 class Takes:
@@ -48,7 +50,7 @@ class Takes:
         refused = partial(self._no_log_of, path, used, _silent)
         take = Take(motion.name, path, log, motion.seconds, log.with_suffix(".txt"), refused)
         self.measure.wait_for_earlier(take)
-        speed = f"at {motion.pace:.0%} of its planned speed"
+        speed = f"with {motion.pace:.0%} of the limits of speed, acceleration and jerk"
         text = f"{motion.name}: {motion.seconds:.1f} s, {speed}"
         self.tell(Note(Level.INFO, text))
         if log.exists() and not is_measured(log):  # the campaign was killed, or its program failed
@@ -72,12 +74,13 @@ class Takes:
         """The motion as it will be played, and its file, by an own check admissible."""
         self._require_proved(motion)
         path = self.folder / f"{motion.name}.csv"
+        slow = motion.pace / self._planned_pace(motion)
         exported = export_file(
             self.folder / motion.plan,
             "csv",
             path,
             chosen=(motion.index,),
-            slow=motion.pace if motion.pace < 1.0 else None,
+            slow=slow if slow < 1.0 - _ROUNDING else None,
             start={} if state.asked.entry else None,
             overwrite=True,
             tell=_silent,
@@ -85,6 +88,12 @@ class Takes:
         motion = replace(motion, pace=min(motion.pace, exported.pace), seconds=exported.duration)
         self._require_admissible(motion, path)
         return motion, path
+
+    def _planned_pace(self, motion: PlayedMotion) -> float:
+        """Share of the limits that it was planned to keep, of those of the campaign's config."""
+        stored = parse_spec(read_result(self.folder / motion.plan).config, f"{motion.plan}")
+        planned, own = stored.constraints.joint_limits, self.case.spec.constraints.joint_limits
+        return planned.pace / own.pace if planned is not None and own is not None else 1.0
 
     def _taken(self, take: Take) -> str:
         """Have a take measured, unless it was before the campaign was killed; why it was not."""

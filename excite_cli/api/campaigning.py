@@ -36,7 +36,7 @@ from excite_cli.campaign.stopping_rule import ended, still_open
 from excite_cli.claim import claim, leave
 from excite_cli.config.load_spec import parse_spec, spec_as_yaml
 from excite_cli.config.spec import Spec
-from excite_cli.errors import FileError
+from excite_cli.errors import ConfigError, FileError
 from excite_cli.excitation.invariant import invariants
 from excite_cli.report.page import render
 from excite_cli.shown.note import Level, Note, Tell, log_note
@@ -96,13 +96,20 @@ def run_campaign(
     ------
     NotMeasuredError
         A motion was not measured; everything before it is kept.
+    ConfigError
+        `sequence.until` asks for the power of effects.
     FileError
         The folder holds another campaign, or none to resume; another run is writing it; a motion
         is not the one that was proved.
     NoAdmissibleMotionError
         No motion within all constraints was found.
     """
-    place = Path(folder)
+    place, until = Path(folder), case.spec.sequence.until
+    if until is not None and until.power:
+        raise ConfigError(
+            "sequence.until.power: a campaign plans until nothing is open, and does not end by "
+            "sizes of effects. Leave it out, or plan with `excite optimize`."
+        )
     with _held(place):
         state = _begun(case, place, asked, resume)
         # What the campaign began with counts, whatever became of the file since.
@@ -188,7 +195,7 @@ class _Loop:
     @property
     def _until(self) -> float | None:
         until = self.case.spec.sequence.until
-        return None if until is None else until.torque_deviation
+        return None if until is None else until.predicted_deviation or until.torque_deviation
 
     def write_page(self, state: Campaign) -> None:
         """The page of all rounds, as far as they are."""
@@ -216,14 +223,19 @@ class _Loop:
             else tuple(" or ".join(each.pair) for each in separation.directions[::2])
         )
         count, model = len(found.joint_names), following.model
-        known = invariants(model, following.prior)
+        deviation = invariants(model, following.prior).torque_deviation
+        until = self.case.spec.sequence.until
+        if until is not None and until.predicted_deviation is not None and following.known:
+            problem, data = following.known
+            assert problem.prediction is not None
+            deviation = problem.prediction.deviation(data.factor)
         learned = RoundFindings(
             found.baseline.mean_relative_moving,
             found.after.mean_relative_moving,
             tuple(what_and_where(each.effect, count) for each in found.effects),
             still_open(found, pairs),
             pairs,
-            known.torque_deviation,
+            deviation,
         )
         self._say(round_in_words(last.number, learned))
         return learned

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
+from excite_cli.api.least_time import duration_is_free
 from excite_cli.api.motions import Motions, load_motions
 from excite_cli.config.load_spec import parse_spec
 from excite_cli.errors import FileError
@@ -102,10 +103,10 @@ def _compare_configs(problem: Problem, result: Result, name: str, tell: Tell) ->
     Raises
     ------
     FileError
-        It has another trajectory section.
+        It has another trajectory section, where its motions may not be shorter than that says.
     """
     stored = parse_spec(result.config, f"the config stored in {name}")
-    if stored.trajectory != problem.spec.trajectory:
+    if stored.trajectory != problem.spec.trajectory and not duration_is_free(stored):
         raise FileError(f"{name} has motions of another trajectory section than the config.")
     differing = [key for key in _JUDGED if getattr(stored, key) != getattr(problem.spec, key)]
     if result.fingerprint != problem.robot.fingerprint():

@@ -212,6 +212,13 @@ def _built(spec: Spec, folder: Path, file: Path | None, tell: Tell) -> Problem:
     return problem
 
 
+def with_spec(problem: Problem, spec: Spec) -> Problem:
+    """The problem that `spec` asks for in place of its own, with the same work and files."""
+    fit = fit_knowledge(spec, problem.folder)
+    built = build_problem(spec, problem.folder, fit, problem.work)
+    return replace(built, file=problem.file)
+
+
 def states_of_work(spec: Spec, folder: Path, tell: Tell) -> tuple[Array, Array, Array] | None:
     """q, v, a (N, n) of the log or the plan that `task` names; None where it names none.
 

@@ -1,14 +1,16 @@
 """Motions one after the other, each with all earlier data stacked: `excite optimize`."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
+from excite_cli.api.least_time import as_planned, duration_is_free, in_least_time
 from excite_cli.api.loading import Case, inputs_of, load_data, states_of_work
 from excite_cli.api.motions import Motions, is_motion, load_motions, tell_doubts
 from excite_cli.api.outputs import held_result
 from excite_cli.api.working import tell_idle
+from excite_cli.diagnosis.goals import Goals
 from excite_cli.diagnosis.measured_prior import measured_stack
 from excite_cli.diagnosis.next_motion import NextMotion
 from excite_cli.diagnosis.next_motion import plan_after as after_diagnosis
@@ -27,13 +29,14 @@ from excite_cli.excitation.sequence import FinishedMotion
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.with_prediction import predicting
 from excite_cli.measurement.dataset import Dataset
+from excite_cli.shown.answer import Answer
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis
 from excite_cli.store.fit_file import fit_knowledge
 from excite_cli.store.own_file import versions
 from excite_cli.store.result_file import is_result, read_result, write_result
 from excite_cli.summary.motions import motion_sentence
-from excite_cli.summary.motions import plan_answer as plan_answer
+from excite_cli.summary.motions import plan_answer as answer_of_plan
 from excite_cli.summary.pairs import doubts_in_words
 from excite_cli.summary.problem import problem_notes
 from excite_cli.trajectory.fade import Segment
@@ -151,25 +154,42 @@ def plan(
     following = problem if isinstance(problem, NextMotion) else None
     model = problem.model if isinstance(problem, NextMotion) else problem
 
-    def store(step: FinishedMotion, current: Result) -> None:
-        if path is not None:
-            write_result(path, current, model)
-        tell(Note(Level.INFO, motion_sentence(step.motion)))
+    def run(
+        at: Problem,
+        begun: Result,
+        most: int | None = None,
+        begin: Sequence[Segment] = (),
+        stored: bool = True,
+    ) -> Result:
+        goals = Goals(at, following.known if following else None)
+
+        def keep(step: FinishedMotion, current: Result) -> None:
+            if path is not None and stored:
+                write_result(path, current, at)
+            tell(Note(Level.INFO, motion_sentence(step.motion)))
+
+        return continue_run(
+            following.problem if following else at,
+            begun,
+            lambda index: lambda state: progress(index, state),
+            keep,
+            at if following else None,
+            begin or load_motions(at, starts, tell=tell),
+            workers,
+            lambda found: len(found.motions) == most or goals.reached(found),
+        )
 
     read = inputs_of(model, priors, starts, following.name if following else None)
     with held_result(path, overwrite, resume, read):
         tell_idle(1 if workers is None else workers.count, model.restarts, tell)
-        result = _begun(model, following, priors, path if resume else None, tell)
-        segments = load_motions(model, starts, tell=tell)
-        return continue_run(
-            following.problem if following else model,
-            result,
-            lambda index: lambda state: progress(index, state),
-            store,
-            following.model if following else None,
-            segments,
-            workers,
-        )
+        at, result = _begun(model, following, priors, path if resume else None, tell)
+        fixed = following is not None or not duration_is_free(model.spec)
+        if fixed or at is not model or result.priors or len(result.motions) > 1:
+            return run(at, result)
+        found = in_least_time(model, result, run, tell)
+        if path is not None and not found.stored:
+            write_result(path, found.result, found.problem)
+        return found.result
 
 
 def _begun(
@@ -178,24 +198,41 @@ def _begun(
     priors: Sequence[Prior],
     stored: Path | None,
     tell: Tell,
-) -> Result:
-    """The result to go on with: that of the file `stored` if there is one, else what is earlier."""
+) -> tuple[Problem, Result]:
+    """The result to go on with: that of the file `stored` if there is one, else what is earlier.
+
+    And the problem that it is of: as `model`, or with the duration that motions of the file have.
+    """
     names = [name_of(prior, number) for number, prior in enumerate(priors, start=1)]
     earlier = [following.name, *names] if following else names
     if stored is not None and stored.exists():
         read = read_result(stored)
+        model = as_planned(model, read)
         found = resumed_result(model, read, stored, [Path(n) for n in earlier])
         count, held = len(found.motions), len(read.motions)
         anew = f"; motion {held}, which was interrupted, is made anew" if held > count else ""
         tell(Note(Level.INFO, f"resuming after motion {count} of {stored}{anew}"))
         tell_doubts(found, str(stored), tell)
-        return found
+        return model, found
     stacks: list[tuple[str, Result | Stack]] = []
     if following is not None:
         stacks.append((following.name, following.prior))
     for name, prior in zip(names, priors, strict=True):
         stacks.append((name, load_prior(model, prior, name, tell)))
-    return new_result(model, stacks, versions(), model.folder)
+    return model, new_result(model, stacks, versions(), model.folder)
+
+
+def plan_answer(
+    planned: Planned,
+    result: Result,
+    output: str,
+    efficiency: bool = False,
+    power: Mapping[str, float] | None = None,
+) -> Answer:
+    """What `excite optimize` answers; see `summary.motions.plan_answer`."""
+    if isinstance(planned, Problem):
+        planned = as_planned(planned, result)
+    return answer_of_plan(planned, result, output, efficiency, power)
 
 
 @checked()

@@ -14,13 +14,13 @@ from excite_cli.errors import FileError, refusal
 from excite_cli.robot.model import Robot
 from excite_cli.shown.record import Shown
 
-# At what pace the motions of a round are played, and which effects a motion looks for.
+# At what pace the motions of a round are played at least, and which effects a motion looks for.
 
 _FASTER = 2.0  # from round to round
 
 
 def pace_of(number: int, from_speed: float) -> float:
-    """Share of the motions' own pace in round `number`, the first being 1: twice as fast each."""
+    """Share of the limits in round `number`, the first being 1, at least: twice as fast each."""
     return min(1.0, from_speed * _FASTER ** (number - 1))
 
 
@@ -53,7 +53,7 @@ End = Literal["", "complete", "budget", "stuck"]
 class CampaignOptions:
     """What was asked of a campaign when it began.
 
-    `from_speed`: pace of the first round, as a share of the motions' own; `most_rounds` and
+    `from_speed`: pace of the first round, as a share of the limits; `most_rounds` and
     `most_seconds` (of motion; 0: no bound) are its budget. `plain`: without motions that explore.
     """
 
@@ -69,7 +69,8 @@ class PlayedMotion:
     """A motion of a round: where it is planned, and its log once there is a good one.
 
     `plan` and `data` are names of files in the campaign's folder, `index` is that of the motion in
-    its plan. `pace`: share of its own pace; `seconds`: how long the robot moves, ways included.
+    its plan. `pace`: share of the limits of speed, acceleration and jerk; `seconds`: how long the
+    robot moves, ways included.
     `rejected`: why takes of it were no log of it.
     """
 
@@ -91,7 +92,7 @@ class RoundFindings:
     of the declared model (`before`) and with all effects found (`after`). `effects`: what is named,
     and where. `open`: what still matters, in sentences; `pairs`: effects that a motion could tell
     apart. `torque_deviation`: to how much of one sample's noise torques are predicted at random
-    states.
+    states, or those of the work where `sequence.until` asks for these.
     """
 
     before: float
@@ -119,6 +120,11 @@ class CampaignRound:
     def missing(self) -> PlayedMotion | None:
         """The first motion that has no log yet."""
         return next((each for each in self.motions if not each.data), None)
+
+    @property
+    def pace(self) -> float:
+        """Share of the limits of the slowest motion."""
+        return min((each.pace for each in self.motions), default=1.0)
 
     def with_motion(self, motion: PlayedMotion) -> "CampaignRound":
         """With another record of the motion of that name."""

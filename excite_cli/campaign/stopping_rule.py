@@ -62,7 +62,7 @@ def ended(campaign: Campaign, until: float | None) -> Campaign:
         return campaign
     learned, asked = last.learned, campaign.asked
     lacking = list(learned.open)
-    if pace_of(last.number, asked.from_speed) < 1.0:
+    if max(last.pace, pace_of(last.number, asked.from_speed)) < 1.0:
         lacking.append("no motion has been played at full speed yet")
     if last.number < 2:
         lacking.append("no exploration motion has been tested yet")

@@ -67,7 +67,8 @@ def campaign(
             rich_help_panel=_BUDGET,
             min=0.01,
             max=1.0,
-            help="Pace of the first round, as a share; it doubles from round to round.",
+            help="Share of the limits of speed, acceleration and jerk in the first round; it "
+            "doubles from round to round.",
         ),
     ] = 1.0,
     max_rounds: Annotated[

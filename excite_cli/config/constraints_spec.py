@@ -25,6 +25,11 @@ class JointLimitsSpec(Section):
     acceleration: Positive | None = Field(None, description="[rad/s²] for every joint")
     jerk: Positive | None = Field(None, description="[rad/s³] for every joint")
     scale: Share = Field(1.0, description="share of velocity limits")
+    pace: Share = Field(
+        1.0,
+        description="share of the limits of velocity, acceleration and jerk: of a first motion, "
+        "when little is known of the robot",
+    )
     position_margin: NonNegative = Field(0.0, description="kept from position limits [rad or m]")
 
 

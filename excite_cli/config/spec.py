@@ -164,10 +164,22 @@ class OptimizerSpec(Section):
 class UntilSpec(Section):
     """What ends a sequence: every precision that is given is reached, or the time is spent.
 
-    Precision is that of all data, earlier ones (`--prior`) included. Both figures are the same
-    whichever columns are called base parameters.
+    Precision is that of all data, earlier ones (`--prior`) included. No figure depends on which
+    columns are called base parameters. With `predicted_deviation` or `power`, and without
+    `sequence.motions`, motions are also as short as they may be: no longer than `trajectory` says.
     """
 
+    predicted_deviation: Positive | None = Field(
+        None,
+        description="standard deviation of torques predicted for the task (RMS), in units of the "
+        "noise of one sample, effects being unknown, too: what `excite optimize` prints",
+    )
+    power: dict[str, Positive] = Field(
+        default_factory=dict,
+        description="sizes of effects, {kind: size of its first parameter}, that a diagnosis of "
+        "the motions would name on every joint",
+    )
+    probability: Share = Field(0.95, lt=1, description="with which it would name those of `power`")
     torque_deviation: Positive | None = Field(
         None,
         description="standard deviation of torques predicted at random states within the limits "
@@ -184,7 +196,14 @@ class UntilSpec(Section):
     @property
     def precise(self) -> bool:
         """Whether a precision is asked for."""
-        return self.torque_deviation is not None or self.efficiency is not None
+        return (
+            self.counts_seconds or self.torque_deviation is not None or self.efficiency is not None
+        )
+
+    @property
+    def counts_seconds(self) -> bool:
+        """Whether what is asked for grows with the seconds of motion, not with instants alone."""
+        return self.predicted_deviation is not None or bool(self.power)
 
 
 class SequenceSpec(Section):
@@ -193,7 +212,7 @@ class SequenceSpec(Section):
     motions: Motions | None = Field(
         None,
         description="how many, each on top of all earlier ones; with `until`: at most; default: 1, "
-        "with `until` 20",
+        "with `until` 20, as short as what is asked for allows",
     )
     until: UntilSpec | None = Field(None, description="ends the sequence earlier")
 

@@ -101,13 +101,13 @@ class JointBound(Constraint):
         if spec.velocity is not False:
             given = None if spec.velocity is True else float(spec.velocity)
             speed = limits.velocity if given is None else np.minimum(limits.velocity, given)
-            speed = spec.scale * speed
+            speed = spec.pace * spec.scale * speed
             found.append(cls.between(1, -speed, speed, robot))
         for order, own, given in (
             (2, limits.acceleration, spec.acceleration),
             (3, limits.jerk, spec.jerk),
         ):
-            bound = own if given is None else np.minimum(own, given)
+            bound = spec.pace * (own if given is None else np.minimum(own, given))
             found.append(cls.between(order, -bound, bound, robot))
         of_motors = () if robot.motors is None else _motor_bounds(spec, robot.motors)
         return [bound for bound in (*found, *of_motors) if bound.labels]
@@ -137,8 +137,8 @@ def _motor_bounds(spec: JointLimitsSpec, motors: Motors) -> Iterable[Constraint]
     if spec.position:
         yield MotorBound(motors, 0, *motors.ranges())
     if spec.velocity is not False:
-        speed = spec.scale * motors.bounds("velocity")
+        speed = spec.pace * spec.scale * motors.bounds("velocity")
         yield MotorBound(motors, 1, -speed, speed)
     for order in (2, 3):
-        bound = motors.bounds(ORDERS[order])
+        bound = spec.pace * motors.bounds(ORDERS[order])
         yield MotorBound(motors, order, -bound, bound)

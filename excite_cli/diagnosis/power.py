@@ -44,7 +44,8 @@ _ROUNDING = 1e-9
 class EffectPower:
     """The `size` of an effect's first parameter, in `unit`, that is named with this `power`.
 
-    `share`: that size as a share of the joint's usual torque, by the effect's RMS torque.
+    `share`: that size as a share of the joint's usual torque, by the effect's RMS torque; `times`:
+    that size over the standard deviation with which the motions show it.
     """
 
     kind: str
@@ -54,6 +55,7 @@ class EffectPower:
     unit: str
     share: float
     power: float
+    times: float
 
 
 def price(kind: type[Effect], significance: float) -> float:
@@ -84,10 +86,22 @@ def power_of(
     for at, deviation in enumerate(_deviations(prediction, stack)):
         effect, scale, share = _about(prediction, at)
         if effect.kind == kind:
-            chance = _chance(size / scale / deviation, price(type(effect), significance))
+            times = size / scale / deviation
+            chance = _chance(times, price(type(effect), significance))
             if share * size / scale < (1.0 - _ROUNDING) * least_share(prediction, effect):
                 chance = 0.0
-            found.append(_record(prediction, effect, size, share * size / scale, chance))
+            found.append(_record(prediction, effect, size, share * size / scale, chance, times))
+    return tuple(found)
+
+
+def least_sizes(prediction: Prediction, kind: str) -> tuple[EffectPower, ...]:
+    """On every joint the size of `kind` below which no motions make a diagnosis name it."""
+    found = []
+    for at in range(len(prediction.extension.effects)):
+        effect, scale, share = _about(prediction, at)
+        if effect.kind == kind:
+            least = least_share(prediction, effect)
+            found.append(_record(prediction, effect, least / share * scale, least, 1.0, np.inf))
     return tuple(found)
 
 
@@ -123,7 +137,8 @@ def _shown(
     cost = price(type(effect), significance)
     size = times_named(cost, power) * deviation if np.isfinite(deviation) else float("inf")
     size = max(size, least_share(prediction, effect) / share)
-    return _record(prediction, effect, size * scale, size * share, power)
+    times = size / deviation if np.isfinite(deviation) else 0.0
+    return _record(prediction, effect, size * scale, size * share, power, times)
 
 
 def least_share(prediction: Prediction, effect: Effect) -> float:
@@ -160,9 +175,9 @@ def _about(prediction: Prediction, at: int) -> tuple[Effect, float, float]:
 
 
 def _record(
-    prediction: Prediction, effect: Effect, size: float, share: float, power: float
+    prediction: Prediction, effect: Effect, size: float, share: float, power: float, times: float
 ) -> EffectPower:
     robot, first = prediction.extension.robot, effect.parameters[0]
     joints = tuple(robot.joint_names[j] for j in effect.joints)
     unit = effect.unit_on(first.unit, robot.sliding)
-    return EffectPower(effect.kind, joints, first.name, size, unit, share, power)
+    return EffectPower(effect.kind, joints, first.name, size, unit, share, power, times)

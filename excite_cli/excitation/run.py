@@ -8,7 +8,7 @@ from excite_cli.config.load_spec import parse_spec, spec_as_yaml
 from excite_cli.config.spec import OptimizerSpec, SequenceSpec, Spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.dense_grid import dense_condition_number
-from excite_cli.excitation.ending import Ending
+from excite_cli.excitation.ending import motions_within
 from excite_cli.excitation.motion import Doubt
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import ProgressCallback, Status
@@ -126,6 +126,7 @@ def continue_run(
     model: Problem | None = None,
     starts: Sequence[Segment] = (),
     workers: Workers | None = None,
+    reached: Callable[[Result], bool] = lambda result: False,
 ) -> Result:
     """Generate the motions that are still missing, calling `on_motion` after each.
 
@@ -135,16 +136,15 @@ def continue_run(
 
     Interrupted, the best of the motion so far is given to `on_motion` before that goes on.
 
-    With `sequence.until` they end with the motion that reaches it.
+    They end with the motion with which what is asked for is `reached`.
 
     Where `problem` separates effects, `model` is the problem that the result is kept for: the same
     without the rivals. Stack and condition numbers are then its own.
     """
     solver, seed = InteriorPoint(), problem.spec.seed
-    ending = Ending(model or problem)
-    remaining = range(len(result.motions) + 1, ending.most + 1)
+    remaining = range(len(result.motions) + 1, motions_within(problem) + 1)
     stack = _running(problem, result)
-    if ending.reached(result):
+    if reached(result):
         return result
     for step in generate_sequence(problem, solver, stack, remaining, seed, report, starts, workers):
         stored = step if model is None else _judged(step, model, result.stack)
@@ -152,7 +152,7 @@ def continue_run(
         on_motion(stored, result)
         if step.motion.status is Status.INTERRUPTED:
             raise KeyboardInterrupt
-        if ending.reached(result):
+        if reached(result):
             break
     return result
 

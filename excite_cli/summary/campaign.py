@@ -38,7 +38,7 @@ def _row(each: CampaignRound) -> dict[str, str]:
     return {
         "round": str(each.number),
         "motions": str(measured) if measured == every else f"{measured} of {every}",
-        "pace": f"{min(m.pace for m in each.motions):.0%}",
+        "pace": f"{each.pace:.0%}",
         "seconds": f"{sum(m.seconds for m in each.motions if m.data):.0f}",
         "efficiency": "" if each.efficiency is None else f"{each.efficiency:.2%}",
         "declared": f"{learned.before:.2%}" if learned else "",

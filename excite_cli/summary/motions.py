@@ -8,9 +8,9 @@ import numpy as np
 
 from excite_cli.config.spec import UntilSpec
 from excite_cli.diagnosis.expectation import expectation
+from excite_cli.diagnosis.goals import Goal, Goals
 from excite_cli.diagnosis.next_motion import NextMotion
 from excite_cli.excitation.dense_grid import flattered
-from excite_cli.excitation.ending import Ending
 from excite_cli.excitation.invariant import Invariants, design_for, invariants
 from excite_cli.excitation.motion import Motion
 from excite_cli.excitation.not_modelled import not_modelled
@@ -71,11 +71,11 @@ def plan_answer(
         data["power"] = power_data(expected.power)
         parts[:0] = expectation_parts(model, expected, bool(power))
         if until is not None:
-            good = Ending(model).enough(found)
             seconds = len(result.motions) * model.trajectory.duration
-            parts.insert(
-                -1 if good else 0, ending_in_words(until, found, seconds, good, not result.priors)
-            )
+            goals = Goals(model, following.known if following else None).of(result)
+            good = all(goal.needed <= 1.0 for goal in goals)
+            words = ending_in_words(until, goals, seconds, not result.priors)
+            parts.insert(-1 if good else 0, words)
             data["until"] = {"reached": good, "seconds": seconds}
     if following is not None:
         outlook = following.outlook([m.coefficients for m in result.motions])
@@ -86,33 +86,24 @@ def plan_answer(
 
 
 def ending_in_words(
-    until: UntilSpec, found: Invariants, seconds: float, good: bool, alone: bool = True
+    until: UntilSpec, goals: Sequence[Goal], seconds: float, alone: bool = True
 ) -> str:
     """What `sequence.until` asks for, beside what motions of so many `seconds` in all have.
 
-    alone: there are no earlier data, so that more such motions tell as much as these.
+    alone: there are no earlier data, so that more such motions show as much as these.
     """
     total = f"{seconds:.4g} s of motion in all"
     if not until.precise:
         return f"{total}, of {until.duration:g} s that sequence.until.duration allows."
-    if good:
-        return f"sequence.until is reached with {total}."
-    lacking = []
-    most, least = until.torque_deviation, until.efficiency
-    if most is not None and found.torque_deviation > most:
-        needed = seconds * (found.torque_deviation / most) ** 2
-        told = f" (about {needed:.2g} s of motions like these would do)" if alone else ""
-        lacking.append(
-            f"predicted-torque standard deviation is {found.torque_deviation:.2g} σ of one sample "
-            f"instead of {most:g}{told}"
-        )
-    if least is not None and found.efficiency is not None and found.efficiency < least:
-        lacking.append(
-            f"information efficiency is {100 * found.efficiency:.2g} % relative to D-optimal free "
-            f"states instead of {100 * least:g} % (wider limits, or a trajectory "
-            "with more coefficients, may do)"
-        )
-    return f"sequence.until is NOT REACHED with {total}: {'; '.join(lacking)}."
+    lacking = [goal for goal in goals if goal.needed > 1.0]
+    words = "; ".join(goal.words for goal in lacking or goals)
+    if not lacking:
+        return f"sequence.until is reached with {total}: {words}."
+    needed = seconds * max(goal.needed for goal in lacking)
+    said = f"sequence.until is NOT REACHED with {total}: {words}."
+    if not alone or needed == np.inf:
+        return said
+    return f"{said} About {needed:.2g} s of motions like these would be enough."
 
 
 def result_parts(result: Result) -> Parts:

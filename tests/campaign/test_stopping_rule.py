@@ -76,13 +76,16 @@ def test_a_name_that_does_harm_is_open(found: Diagnosis, worse: float, open_: bo
 
 
 def campaign(
-    *rounds: tuple[tuple[str, ...], tuple[str, ...]], known: float = 0.1, **asked: float
+    *rounds: tuple[tuple[str, ...], tuple[str, ...]],
+    known: float = 0.1,
+    pace: float = 1.0,
+    **asked: float,
 ) -> Campaign:
-    """Rounds with (what is open, pairs); each of two motions of 10 s."""
+    """Rounds with (what is open, pairs); each of two motions of 10 s at this `pace`."""
     made = []
     for number, (open_, pairs) in enumerate(rounds, start=1):
         motions = [
-            PlayedMotion(f"r{number}_m{k}", "excite", "p.h5", k, 1.0, 10.0, "log") for k in (1, 2)
+            PlayedMotion(f"r{number}_m{k}", "excite", "p.h5", k, pace, 10.0, "log") for k in (1, 2)
         ]
         findings = RoundFindings(0.1, 0.01, ("spring on elbow",), open_, pairs, known)
         made.append(CampaignRound(number, tuple(motions), findings))
@@ -110,9 +113,10 @@ OTHER = (("c or d: not distinguished yet",), ("c or d",))
         (campaign(), None, ""),
         (campaign(NOTHING), None, ""),
         (campaign(NOTHING, OPEN), None, ""),
-        # Not below the motions' own pace, nor before the precision that is asked for.
-        (campaign(NOTHING, NOTHING, from_speed=0.3), None, ""),
-        (campaign(NOTHING, NOTHING, NOTHING, from_speed=0.3), None, "complete"),
+        # Not below full pace, nor before the precision that is asked for.
+        (campaign(NOTHING, NOTHING, from_speed=0.3, pace=0.6), None, ""),
+        (campaign(NOTHING, NOTHING, from_speed=0.3, pace=1.0), None, "complete"),
+        (campaign(NOTHING, NOTHING, NOTHING, from_speed=0.3, pace=0.6), None, "complete"),
         (campaign(NOTHING, NOTHING, known=0.2), 0.1, ""),
         (campaign(NOTHING, NOTHING, known=0.2), 0.2, "complete"),
         # Pairs that three rounds do not tell apart, and nothing else.

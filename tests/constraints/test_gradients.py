@@ -150,6 +150,20 @@ def test_motors_that_drive_several_joints_are_bounded(uncertain: bool) -> None:
         np.testing.assert_allclose(margins, plain, atol=1e-12)
 
 
+def test_a_pace_is_a_share_of_all_limits_of_motion() -> None:
+    """Of joints and of motors; positions stay."""
+    robot = with_motors()
+    limits = JointLimitsSpec(acceleration=8.0, jerk=90.0, scale=0.5)
+    full, slow = (
+        build_constraints(ConstraintsSpec(joint_limits=each), robot)
+        for each in (limits, limits.model_copy(update={"pace": 0.4}))
+    )
+    assert len(full) == 8
+    for one, other in zip(full, slow, strict=True):
+        share = 1.0 if one.name.endswith("position") else 0.4
+        np.testing.assert_allclose(other.scale, share * one.scale)
+
+
 @pytest.mark.parametrize("uncertain", [False, True])
 def test_bounds_of_motors_between_instants_hold_at_instants(uncertain: bool) -> None:
     robot = with_motors()

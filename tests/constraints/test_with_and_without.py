@@ -48,6 +48,16 @@ def test_with_a_motor_curve_it_holds_and_without_it_is_broken() -> None:
     assert broken.label.startswith("shoulder_pitch")
 
 
+def test_with_a_pace_it_is_slower_and_without_it_is_not() -> None:
+    limits = "constraints.joint_limits={acceleration: 10, pace: %s}"
+    judge, free = _problem(limits % 0.4), _problem(limits % 1.0)
+    margins = worst_margins(judge, one_motion(judge).coefficients)
+    assert all(worst.violations == 0 for worst in margins.values())
+    broken = worst_margins(judge, one_motion(free).coefficients)
+    assert broken["joint_velocity"].margin < 0
+    assert broken["joint_acceleration"].margin < 0
+
+
 def test_a_limit_of_zero_range_between_samples_is_mended() -> None:
     """A coarse grid misses what happens between its instants; the result still holds."""
     problem = _problem(
