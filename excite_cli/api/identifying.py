@@ -20,6 +20,7 @@ from excite_cli.api.outputs import held
 from excite_cli.checks.all_checks import check_dataset
 from excite_cli.config.load_spec import spec_as_yaml
 from excite_cli.excitation.problem import Problem
+from excite_cli.export.drive import drive_of
 from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.identification.carried_load import LoadIdentification
 from excite_cli.identification.carried_load import identify_load as load_on
@@ -86,12 +87,14 @@ def identify(
             lambda text: progress(text, 0),
             one_off,
         )
+        found = replace(found, spec=problem.spec)
         for reason in found.processing.reasons:
             tell(Note(Level.DETAIL, reason))
         tell_findings(found.findings[len(dataset.findings) :], tell)
         if output is not None:
             save_fit(output, problem, found, dataset.sources)
-        write_models(problem.robot, found.fit, models, tell)
+        drive = drive_of(problem.spec, problem.robot.joint_names) if mjcf is not None else None
+        write_models(problem.robot, found.fit, models, tell, drive)
         return found
 
 
@@ -121,7 +124,7 @@ def identify_load(
         The link is unknown or must be named; the fit belongs to another robot; a run is too short.
     """
     problem = measured_case(problem)
-    dataset = dataset_of(problem, data, tell)
+    problem, dataset, _ = with_drive_law(problem, dataset_of(problem, data, tell), None, tell)
     # Signs and order of columns are not judged: beside the URDF, a load looks like other columns.
     stored = fit if isinstance(fit, StoredFit) else read_fit(Path(fit))
     found = load_on(problem.robot, robot_base(problem), dataset, problem.spec, stored, link)
@@ -146,5 +149,5 @@ def save_fit(
         It cannot be written.
     """
     refuse_inputs_as_outputs({"path": Path(path)}, inputs_of(problem, *sources))
-    config, folder = spec_as_yaml(problem.spec), str(problem.folder)
+    config, folder = spec_as_yaml(found.spec or problem.spec), str(problem.folder)
     write_fit(Path(path), found, config, folder, problem.robot.fingerprint(), tuple(sources))

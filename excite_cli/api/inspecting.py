@@ -14,6 +14,7 @@ from excite_cli.api.loading import (
     inputs_of,
     load_data,
     measured_case,
+    with_drive_law,
 )
 from excite_cli.api.outputs import held
 from excite_cli.api.paths import page_path
@@ -112,7 +113,7 @@ def inspect(
             seen = set(map(_key, found))
             try:
                 recorded = as_recorded(case, files)
-                told, is_all = _looked(case, recorded, settings)
+                told, is_all = _looked(case, recorded, settings, tell)
             except ExciteError as error:  # of data as they are; or with what was tried
                 if not turn:
                     raise
@@ -131,7 +132,8 @@ def inspect(
             case = _changed(case, more)
         inspection = LogInspection(rows.in_order(found, bool(files), case.spec), settings, runs)
         if power:
-            shown = power_of_data(case, load_data(case, files, tell))
+            law = with_drive_law(case, load_data(case, files, tell), None, tell)
+            shown = power_of_data(case, law[1])
             inspection = replace(inspection, power=shown, noise=noise_in_words(case.spec))
         if apply is not None:
             _write(Path(apply), problem, settings)
@@ -170,7 +172,7 @@ def _key(result: CheckResult) -> tuple[str, tuple[str, ...], str]:
 
 
 def _looked(
-    case: Case, recorded: Dataset, settled: Mapping[str, Any]
+    case: Case, recorded: Dataset, settled: Mapping[str, Any], tell: Tell
 ) -> tuple[list[CheckResult], bool]:
     """What is seen in files; and, where they may be used, what the dynamics say of them, and true.
 
@@ -180,8 +182,8 @@ def _looked(
     found = rows.of_files(merged(told), case.spec)
     if any(each.status == "fault" or {*each.settings} - {*settled} for each in found):
         return found, False
-    data = completed(case, recorded)
-    spec = case.spec
+    settled_case, data, _ = with_drive_law(case, completed(case, recorded), None, tell)
+    spec = settled_case.spec
     processing = choose_processing(data.runs, spec.measurement.filter, spec.diagnosis.moving_speed)
     prepared = prepare_all(data.runs, processing)
     return [*found, *look(case.robot, data.runs, prepared, spec)], True

@@ -18,6 +18,7 @@ def schema_tree() -> dict[str, Any]:
     from excite_cli.constraints.catalogue import own_constraints, settings_of
     from excite_cli.criteria.catalogue import CRITERIA
     from excite_cli.effects.catalogue import EFFECTS
+    from excite_cli.measurement.torque_sources.catalogue import TORQUE_SOURCES
 
     own = {}
     for name, found in own_constraints().items():
@@ -25,7 +26,12 @@ def schema_tree() -> dict[str, Any]:
         keys = {each.name: {"type": "number"} for each in settings}
         needed = [each.name for each in settings if each.default is each.empty]
         own[name] = {"type": "object", "properties": keys, "required": needed}
-    names = {"effects": EFFECTS.names, "criteria": CRITERIA.names, "checks": [*rows.names()]}
+    names = {
+        "effects": EFFECTS.names,
+        "criteria": CRITERIA.names,
+        "checks": [*rows.names()],
+        "torque_sources": TORQUE_SOURCES.names,
+    }
     whole = Spec.model_json_schema()
     for node in _nodes(whole):
         family = node.get("x-family")

@@ -44,7 +44,6 @@ def replay(
 
     Examples:
       excite replay diagnosis.h5 measured.h5 --held-out
-      excite replay diagnosis.h5 legs.h5 --held-out --beside fit.h5
     """
     from excite_cli.api.replaying import replay as replay_data
     from excite_cli.api.replaying import replay_answer

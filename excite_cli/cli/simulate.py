@@ -197,8 +197,9 @@ def simulate(
       excite simulate ur10.yaml ur10.h5 -o warm.h5 --repeat 4 --pause 300 \\
           --covariate temp=25,end:45,time_constant:600,noise:0.2 \\
           --effect 'covariate_friction@elbow_joint=-0.1,reference:25;covariate:temp'
-      excite simulate ur10.yaml ur10.h5 -o servo.h5 --control position --kp 2000 --kd 100 \\
-          --kp wrist_3_joint=200 --kd wrist_3_joint=5 --command-rate 50 --command-delay 0.01
+      excite simulate ur10.yaml ur10.h5 -o servo.h5 --control position \\
+          --kp 60 --kd 0.5 --kp wrist_1_joint=20 --command-rate 50 \\
+          --command-delay 0.01
     """
     from excite_cli.api.loading import load_case
     from excite_cli.api.simulating import SimulationSettings, parse_series, simulation_answer

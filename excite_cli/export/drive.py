@@ -6,9 +6,8 @@ with g and b what the model holds for the gain and the offset of the measured to
 at the joint is that of a drive with k_p / (1 + g), k_d / (1 + g), and −b / (1 + g) beside it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from excite_cli.effects.torque_gain import TorqueGain
 from excite_cli.effects.torque_offset import TorqueOffset
 from excite_cli.errors import ConfigError
 from excite_cli.identification.identified_model import IdentifiedModel
+from excite_cli.measurement.torque_sources.command import Command, law_of
 from excite_cli.robot.model import Array
 
 
@@ -63,33 +63,15 @@ def drive_of(spec: Spec, joint_names: Sequence[str]) -> Drive | None:
     Raises
     ------
     ConfigError
-        It has no gain for a joint.
+        It has no gain.
     """
-    measurement: Any = spec.measurement
-    if getattr(measurement, "torque", None) != "command":
+    measurement = spec.measurement
+    if measurement.torque != Command.name:
         return None
-    command = getattr(measurement, "command", None)
-    kp, kd, limit = (_of_joints(command, name, joint_names) for name in ("kp", "kd", "limit"))
-    unknown = [name for name, gain in zip(joint_names, kp, strict=True) if not gain > 0.0]
-    if unknown:
+    if measurement.command.kp is None:
         raise ConfigError(
-            f"measurement.command.kp: no gain for {', '.join(unknown)}. Give it (N·m/rad), or "
-            "export a fit or a diagnosis, which hold those that were found."
+            "measurement.command.kp: no gain is given. Give it [N·m/rad], or export a fit or a "
+            "diagnosis, which hold those that were found."
         )
-    kd, limit = np.nan_to_num(kd, nan=0.0), np.where(np.isnan(limit), np.inf, limit)
-    delay = _field(command, "delay")
-    return Drive(kp, kd, limit, np.zeros(len(kp)), 0.0 if delay is None else float(delay))
-
-
-def _field(command: Any, name: str) -> Any:
-    if isinstance(command, Mapping):
-        return command.get(name)
-    return getattr(command, name, None)
-
-
-def _of_joints(command: Any, name: str, joint_names: Sequence[str]) -> Array:
-    """A number for all joints, or one by one; NaN where there is none (n,)."""
-    given = _field(command, name)
-    if isinstance(given, Mapping):
-        return np.array([float(given.get(joint, np.nan)) for joint in joint_names])
-    return np.full(len(joint_names), np.nan if given is None else float(given))
+    law = law_of(measurement, tuple(joint_names))
+    return Drive(law.kp, law.kd, law.limit, np.zeros(len(law.kp)), law.delay)

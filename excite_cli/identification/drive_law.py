@@ -88,7 +88,7 @@ class FoundLaw:
         if self.delay_std is not None:
             text = (
                 f"set points act {1e3 * self.law.delay:.1f} ± {1e3 * self.delay_std:.1f} ms after "
-                "they were recorded"
+                f"they were recorded (measurement.command.delay: {self.law.delay:.4g})"
             )
             settings = {"measurement.command.delay": float(f"{self.law.delay:.4g}")}
             found.append(Finding("command_delay", "note", text, settings=settings))

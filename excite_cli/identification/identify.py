@@ -63,7 +63,7 @@ class Identification(Shown):
 
     `noise_floor` [N·m] (N): RMS per joint of what changes from period to period in training runs;
     None if no motion was repeated. `traces`: torque over time, in `torque_units` per joint.
-    `recorded`: when.
+    `recorded`: when. `spec`: the config with what was found of the drives' law in it.
     """
 
     fit: Fit
@@ -77,6 +77,7 @@ class Identification(Shown):
     torque_units: tuple[str, ...] = ()
     traces: tuple[TorqueTrace, ...] = ()
     recorded: Recorded = field(default_factory=Recorded)
+    spec: Spec | None = None
 
 
 def identify(

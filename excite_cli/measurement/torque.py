@@ -58,9 +58,14 @@ def check_joints(spec: MeasurementSpec, joints: tuple[str, ...], torques: bool =
         "offset": list(spec.offset),
         "without_torque": list(spec.without_torque),
         "angle": list(spec.angle) if isinstance(spec.angle, dict) else [],
+        "command.kd": list(spec.command.kd) if isinstance(spec.command.kd, dict) else [],
     }
-    for key in ("gear_ratio", "torque_constant", "torque_unit"):
-        value = getattr(spec, key)
+    sizes: dict[str, object] = {
+        key: getattr(spec, key) for key in ("gear_ratio", "torque_constant", "torque_unit")
+    }
+    sizes |= {f"command.{key}": getattr(spec.command, key) for key in ("kp", "limit")}
+    sizes |= {f"motor.{key}": getattr(spec.motor, key) for key in ("resistance", "back_emf")}
+    for key, value in sizes.items():
         if isinstance(value, dict):
             named[key] = list(value)
             missing = [joint for joint in joints if joint not in value]

@@ -12,6 +12,7 @@ import pytest
 from excite_cli import ConfigError, ExciteError, FileError, Note, diagnose, export_file
 from excite_cli.api import model_exports
 from excite_cli.api.model_exports import uncertain_model
+from excite_cli.config.data_spec import DriveLawSpec
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.robot.model import Array
 from excite_cli.simulation.build import true_inertias
@@ -34,7 +35,7 @@ def commanded(monkeypatch: pytest.MonkeyPatch, command: Any) -> None:
 
     def read(path: Path) -> Any:
         stored = read_model(path)
-        changed = {"torque": "command", "command": command}
+        changed = {"torque": "command", "command": DriveLawSpec(**command)}
         measurement = stored.spec.measurement.model_copy(update=changed)
         return replace(stored, spec=stored.spec.model_copy(update={"measurement": measurement}))
 

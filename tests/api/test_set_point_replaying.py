@@ -22,6 +22,7 @@ from excite_cli import (
 from excite_cli.api.replaying import replay_answer
 from excite_cli.api.set_point_replaying import _held, set_points
 from excite_cli.api.simulating import PositionDrive
+from excite_cli.config.data_spec import DriveLawSpec
 from excite_cli.export.drive import Drive
 from excite_cli.measurement.dataset import Run
 from excite_cli.robot.model import Array
@@ -51,7 +52,7 @@ def commanded(model: Model) -> Model:
     command = {"kp": dict(zip(("elbow", "slide"), KP, strict=True)), "delay": DELAY}
     command["kd"] = dict(zip(("elbow", "slide"), KD, strict=True))
     spec = model.made.spec
-    changed = {"torque": "command", "command": SimpleNamespace(**command, limit=None)}
+    changed = {"torque": "command", "command": DriveLawSpec(**command)}
     measurement = spec.measurement.model_copy(update=changed)
     stored = replace(model.made, spec=spec.model_copy(update={"measurement": measurement}))
     return Model(stored)

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from excite_cli.config.data_spec import EffectSpec
+from excite_cli.config.data_spec import DriveLawSpec, EffectSpec
 from excite_cli.config.load_spec import parse_spec
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.config.spec import Spec
@@ -40,6 +40,6 @@ def identified(
 def spec_with(command: Any, torque: str = "command") -> Spec:
     """A config of a robot whose torque is the law of its drives."""
     spec = parse_spec("robot: {urdf: 'example-robot-data:ur10'}", "a test")
-    changed = {"torque": torque, "command": command}
+    changed = {"torque": torque, "command": DriveLawSpec(**command)}
     measurement = spec.measurement.model_copy(update=changed)
     return spec.model_copy(update={"measurement": measurement})

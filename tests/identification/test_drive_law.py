@@ -127,7 +127,9 @@ def test_coarse_encoders_do_not_move_the_delay() -> None:
 def test_the_sentences() -> None:
     law = DriveLaw(np.array([20.0, 5.0]), np.zeros(2), np.full(2, np.inf), 0.0082)
     delay, gains = FoundLaw(law, 4e-4, np.array([0.1, 0.4])).findings(("hip", "knee"))
-    assert delay.text == "set points act 8.2 ± 0.4 ms after they were recorded"
+    assert delay.text == (
+        "set points act 8.2 ± 0.4 ms after they were recorded (measurement.command.delay: 0.0082)"
+    )
     assert delay.settings == {"measurement.command.delay": 0.0082}
     assert "hip 20 ± 2, knee 5 ± 2" in gains.text
     assert gains.settings == {"measurement.command.kp": {"hip": 20.0, "knee": 5.0}}

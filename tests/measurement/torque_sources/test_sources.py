@@ -10,7 +10,7 @@ import pytest
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.measurement.dataset import Run
-from excite_cli.measurement.torque import to_joints
+from excite_cli.measurement.torque import check_joints, to_joints
 from excite_cli.measurement.torque_sources.catalogue import TORQUE_SOURCES, torque_source
 from excite_cli.measurement.torque_sources.command import held, law_of
 from tests.measurement.recordings import JOINTS, motion, read, recorded
@@ -71,8 +71,8 @@ def test_set_points_have_the_units_of_positions() -> None:
         run, q=np.degrees(run.q), dq=None, extra={"q_cmd": np.degrees(run.extra["q_cmd"])}
     )
     spec = MeasurementSpec(
-        torque="command", command={"kp": 20.0, "period": 0.0}, angle="deg", position_sign={"elbow": -1},
-        offset={"wrist": 0.2},
+        torque="command", command={"kp": 20.0, "period": 0.0}, angle="deg",
+        position_sign={"elbow": -1}, offset={"wrist": 0.2},
     )  # fmt: skip
     found = to_joints(degrees, spec, JOINTS, TURNS)
     plain = by_law(replace(run, dq=None), kp=20.0).tau
@@ -148,3 +148,10 @@ def test_every_source_says_what_it_needs(name: str) -> None:
     assert source.channels
     assert source.title
     assert bool(source.scaled_by) == (name != "link")
+
+
+def test_gains_of_all_joints_or_none() -> None:
+    with pytest.raises(ConfigError, match=r"measurement.command.kp: no value for elbow, wrist"):
+        check_joints(MeasurementSpec(torque="command", command={"kp": {"shoulder": 2.0}}), JOINTS)
+    with pytest.raises(ConfigError, match=r"measurement.command.kd: 'elbo' is not a moved joint"):
+        check_joints(MeasurementSpec(torque="command", command={"kd": {"elbo": 2.0}}), JOINTS)
