@@ -13,6 +13,7 @@ from excite_cli.criteria.catalogue import CRITERIA
 from excite_cli.effects.catalogue import EFFECTS
 from excite_cli.errors import ConfigError, ExciteWarning
 from excite_cli.measurement.catalogue import READERS
+from excite_cli.measurement.torque_sources.catalogue import TORQUE_SOURCES
 from excite_cli.motion_formats.catalogue import MOTION_FORMATS
 from excite_cli.registry import Registry
 from tests.effects import own_package
@@ -20,7 +21,15 @@ from tests.registries import forget
 
 FAMILIES = {
     registry.group: registry
-    for registry in (EFFECTS, CONSTRAINTS, CRITERIA, READERS, MOTION_FORMATS, CHECKS)
+    for registry in (
+        EFFECTS,
+        CONSTRAINTS,
+        CRITERIA,
+        READERS,
+        MOTION_FORMATS,
+        CHECKS,
+        TORQUE_SOURCES,
+    )
 }
 EVERY = pytest.mark.parametrize("group", FAMILIES)
 MOST = 15  # modules of the program that a base imports
