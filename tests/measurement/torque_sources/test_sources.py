@@ -13,7 +13,7 @@ from excite_cli.measurement.dataset import Run
 from excite_cli.measurement.torque import check_joints, to_joints
 from excite_cli.measurement.torque_sources.catalogue import TORQUE_SOURCES, torque_source
 from excite_cli.measurement.torque_sources.command import held, law_of
-from tests.measurement.recordings import JOINTS, motion, read, recorded
+from tests.measurement.recordings import JOINTS, check, motion, only, read, recorded
 
 TURNS = np.ones(3, bool)
 
@@ -131,6 +131,13 @@ def test_columns_of_a_file(tmp_path: Path) -> None:
     (without,) = read(tmp_path / "a.csv", without_torque=("elbow",), **told).runs
     assert not without.tau[:, 1].any()
     assert not without.usable()[:, 1].any()
+
+
+def test_torques_of_a_gain_that_is_sought_are_not_judged_by_size() -> None:
+    run = sent(ahead=0.001)
+    small = replace(run, tau=by_law(run, kp=1.0, delay=0.0).tau)
+    assert not check(small, torque="command")[1]
+    assert only(check(small, torque="command", command={"kp": 1.0})[1], "torque_units")
 
 
 def test_without_set_points_or_source(tmp_path: Path) -> None:
