@@ -105,8 +105,10 @@ class Goals:
 
     def _of_power(self, expected: Expectation) -> Iterator[Goal]:
         """Of every kind that of the joint that lacks most, of those on which motions show it."""
-        probability, alpha = self._until.probability, self._problem.spec.diagnosis.significance
-        for kind in self._until.power:
+        until: UntilSpec = self._until
+        probability = until.probability
+        alpha = self._problem.spec.diagnosis.significance
+        for kind in until.power:
             least = times_named(price(kind_named(kind), alpha), probability)
             of = [each for each in expected.power if each.kind == kind]
             shown = [each for each in of if each.times > 0.0]

@@ -12,8 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from excite_cli.config.spec import Spec
-from excite_cli.effects.torque_gain import TorqueGain
-from excite_cli.effects.torque_offset import TorqueOffset
 from excite_cli.errors import ConfigError
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.measurement.torque_sources.command import Command, law_of
@@ -50,9 +48,9 @@ def law_errors(model: IdentifiedModel, count: int) -> tuple[Array, Array]:
     """Gain g and offset b [N·m] of the measured torque of every joint (count,)."""
     gain, offset = np.zeros(count), np.zeros(count)
     for effect, values in model.by_effect:
-        if not effect.runs and isinstance(effect, TorqueGain):
+        if not effect.runs and effect.kind == "torque_gain":
             gain[list(effect.joints)] += values[0]
-        elif not effect.runs and isinstance(effect, TorqueOffset):
+        elif not effect.runs and effect.kind == "torque_offset":
             offset[list(effect.joints)] += values[0]
     return gain, offset
 

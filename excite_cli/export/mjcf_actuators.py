@@ -14,8 +14,6 @@ from importlib.util import find_spec
 from math import ceil, isfinite
 
 from excite_cli.effects.base import Effect
-from excite_cli.effects.torque_gain import TorqueGain
-from excite_cli.effects.torque_offset import TorqueOffset
 from excite_cli.export.drive import Drive
 from excite_cli.export.exported import number
 
@@ -26,7 +24,7 @@ _SHORTEST_STEP = 5e-4  # s: a physics step for which the history of set points i
 
 def held_by_actuators(effect: Effect) -> bool:
     """Whether the actuators' coefficients hold it."""
-    return isinstance(effect, TorqueGain | TorqueOffset) and not effect.runs
+    return effect.kind in ("torque_gain", "torque_offset") and not effect.runs
 
 
 def add_actuators(root: ElementTree.Element, joint_names: Sequence[str], drive: Drive) -> list[str]:
