@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
+from excite_cli.api.drive_law import with_drive_law
 from excite_cli.api.loading import (
     Case,
     dataset_of,
@@ -13,7 +14,6 @@ from excite_cli.api.loading import (
     robot_base,
     sources_of,
     tell_findings,
-    with_drive_law,
 )
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_text_atomically
@@ -83,7 +83,7 @@ def diagnose(
     inputs = inputs_of(problem, *sources_of(data))
     with held({"output": output, "apply": apply}, overwrite, inputs), at_hand(workers):
         dataset = dataset_of(problem, data, tell)
-        problem, dataset, _ = with_drive_law(problem, dataset, held_out, tell)
+        problem, dataset = with_drive_law(problem, dataset, held_out, tell)
         found = diagnose_dataset(
             problem.robot, robot_base(problem), dataset, problem.spec, held_out, progress, ended
         )

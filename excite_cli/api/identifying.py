@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
+from excite_cli.api.drive_law import with_drive_law
 from excite_cli.api.loading import (
     Case,
     dataset_of,
@@ -13,7 +14,6 @@ from excite_cli.api.loading import (
     robot_base,
     sources_of,
     tell_findings,
-    with_drive_law,
 )
 from excite_cli.api.models import write_models
 from excite_cli.api.outputs import held
@@ -74,7 +74,7 @@ def identify(
     inputs = inputs_of(problem, *sources_of(data))
     with held({"output": output, **models}, overwrite, inputs), at_hand(workers):
         dataset = dataset_of(problem, data, tell)
-        problem, dataset, one_off = with_drive_law(problem, dataset, held_out, tell)
+        problem, dataset = with_drive_law(problem, dataset, held_out, tell)
         suspicious = check_dataset(problem.robot, dataset, problem.spec, held_out)
         dataset = replace(dataset, findings=(*dataset.findings, *suspicious))
         tell_findings(suspicious, tell)
@@ -85,7 +85,6 @@ def identify(
             problem.spec,
             held_out,
             lambda text: progress(text, 0),
-            one_off,
         )
         found = replace(found, spec=problem.spec)
         for reason in found.processing.reasons:
@@ -124,7 +123,7 @@ def identify_load(
         The link is unknown or must be named; the fit belongs to another robot; a run is too short.
     """
     problem = measured_case(problem)
-    problem, dataset, _ = with_drive_law(problem, dataset_of(problem, data, tell), None, tell)
+    problem, dataset = with_drive_law(problem, dataset_of(problem, data, tell), None, tell)
     # Signs and order of columns are not judged: beside the URDF, a load looks like other columns.
     stored = fit if isinstance(fit, StoredFit) else read_fit(Path(fit))
     found = load_on(problem.robot, robot_base(problem), dataset, problem.spec, stored, link)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from excite_cli.api.arguments import checked
+from excite_cli.api.drive_law import with_drive_law
 from excite_cli.api.loading import (
     Case,
     as_recorded,
@@ -14,7 +15,6 @@ from excite_cli.api.loading import (
     inputs_of,
     load_data,
     measured_case,
-    with_drive_law,
 )
 from excite_cli.api.outputs import held
 from excite_cli.api.paths import page_path
@@ -132,8 +132,8 @@ def inspect(
             case = _changed(case, more)
         inspection = LogInspection(rows.in_order(found, bool(files), case.spec), settings, runs)
         if power:
-            law = with_drive_law(case, load_data(case, files, tell), None, tell)
-            shown = power_of_data(case, law[1])
+            by_law = with_drive_law(case, load_data(case, files, tell), None, tell)
+            shown = power_of_data(case, by_law[1])
             inspection = replace(inspection, power=shown, noise=noise_in_words(case.spec))
         if apply is not None:
             _write(Path(apply), problem, settings)
@@ -182,7 +182,7 @@ def _looked(
     found = rows.of_files(merged(told), case.spec)
     if any(each.status == "fault" or {*each.settings} - {*settled} for each in found):
         return found, False
-    settled_case, data, _ = with_drive_law(case, completed(case, recorded), None, tell)
+    settled_case, data = with_drive_law(case, completed(case, recorded), None, tell)
     spec = settled_case.spec
     processing = choose_processing(data.runs, spec.measurement.filter, spec.diagnosis.moving_speed)
     prepared = prepare_all(data.runs, processing)

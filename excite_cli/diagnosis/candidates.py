@@ -64,9 +64,9 @@ def possible_effects(
 
     `around` are shapes at places where effects were found already. Kinds that follow a column of
     the log are none where no column is declared, so that they cost the others nothing; nor are
-    those of a wrench where none is measured, nor, unless they are asked for by name, those that
-    change with time in few recordings: seconds left out lie within the time of the others, and
-    predict nothing of a recording that goes on for longer, or of the next one.
+    those of a wrench or of a torque sensor where there is none, nor, unless they are asked for by
+    name, those that change with time in few recordings: seconds left out lie within the time of the
+    others, and predict nothing of a recording that goes on for longer, or of the next one.
 
     Raises
     ------
@@ -122,6 +122,7 @@ def _can_show(kind: type[Effect], spec: DiagnosisSpec, seen: SeenRuns) -> bool:
     return (
         (bool(seen.covariates) or not kind.follows_covariate)
         and (bool(seen.robot.base_joints) or kind.scope != "base")
+        and (seen.measured or not kind.of_sensor)
         and (
             spec.kinds != "all"
             or len(seen.trained) >= rules.RUNS_OF_A_DRIFT

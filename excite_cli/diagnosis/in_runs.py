@@ -37,7 +37,8 @@ Runs = tuple[str, ...]
 class SeenRuns:
     """Training parts, and what they leave: `signals` and `residuals` (T, n) of each.
 
-    `runs`: names of all runs, trained on or not; `states` those that the configuration declares.
+    `runs`: names of all runs, trained on or not; `states` those that the configuration declares;
+    `measured`: whether sensors gave the torque.
     """
 
     robot: Robot
@@ -45,6 +46,7 @@ class SeenRuns:
     residuals: Sequence[Array]
     runs: Sequence[str]
     states: States = field(default_factory=dict)
+    measured: bool = True
 
     @cached_property
     def _by_name(self) -> dict[str, list[int]]:

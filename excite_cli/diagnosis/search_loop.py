@@ -298,7 +298,8 @@ def _one_pass(
             for effect in fit.effects
             if effect.shape or effect.runs
         }
-        seen = SeenRuns(model.robot, signals, raw, run_names, model.states)
+        measured = all(run.unsure is None for run in data.runs)
+        seen = SeenRuns(model.robot, signals, raw, run_names, model.states, measured)
         possible = possible_effects(spec, model.declared, seen, shapes)
         candidates = with_columns(possible, signals, data.runs)
     plain = data.evidence(candidates, NoiseModel.white(fit.levels))

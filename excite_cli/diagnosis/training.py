@@ -1,7 +1,7 @@
 """The training data of a diagnosis: motion, inertial columns and torque of every part."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -151,7 +151,8 @@ class TrainingData:
         for part, run in enumerate(self.runs):
             joints = [self.columns(candidates, chosen, part, joint) for joint in range(self.n)]
             columns = spool.keep(np.stack(joints, axis=1))
-            found.append(RunRows(columns, self.tau[part], run.usable, rounding=run.rounding))
+            own = RunRows(columns, self.tau[part], run.usable)
+            found.append(replace(own, rounding=run.rounding, unsure=run.unsure))
             forget()
         return found
 

@@ -82,6 +82,7 @@ class Effect(Judgement, Mechanism, Presentation, ABC):
     # What tells its size where inertias take it up, as a person may declare it.
     identified_by: ClassVar[str] = ""
     on_base: ClassVar[bool] = False  # rows of a measured base may have it, which have no gears
+    of_sensor: ClassVar[bool] = False  # of a torque that was measured: a law's has none
     # Its torque at an instant depends on the time, or on other instants: it needs a series.
     over_time: ClassVar[bool] = False
     excitable: ClassVar[bool] = True  # has columns for a planned motion, and `pull_back`

@@ -39,6 +39,7 @@ class TorqueDelay(Effect):
         ),
     )  # fmt: skip
     data_defect: ClassVar = True
+    of_sensor: ClassVar = True
 
     @classmethod
     def places(cls, robot: Robot) -> list[tuple[int, ...]]:

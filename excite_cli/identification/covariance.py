@@ -122,6 +122,8 @@ class RunRows:
     """Rows of one run: `columns` (M, n, p), `tau`, `usable` (M, n), `weights` (M, n) or None.
 
     `rounding`: per joint what is uncertain in torques that come in steps (`rounding_of`).
+    `unsure` (u, M, n): how the torques of all runs change by one standard deviation of each figure
+    that they are computed with.
     """
 
     columns: Array
@@ -129,6 +131,7 @@ class RunRows:
     usable: Mask
     weights: Array | None = None
     rounding: tuple[csr_matrix | None, ...] = ()
+    unsure: Array | None = None
 
     def residual(self, x: Array) -> Array:
         """τ − C x (M, n), zero where unusable."""
@@ -166,12 +169,26 @@ def estimate_covariance(
                 rounded = rounding.T @ columns
                 meat += rounded.T @ rounded
     matrix = inverse @ meat @ inverse
+    moved = inverse @ _scores(runs, sigma)
     with np.errstate(divide="ignore", invalid="ignore"):
         shares = white / np.diag(matrix)
     shares = shares[np.isfinite(shares)]
     count = sum(int(run.usable.sum()) for run in runs)
     samples = count * min(float(np.median(shares)), 1.0) if len(shares) else float("nan")
-    return (matrix + matrix.T) / 2, samples
+    return (matrix + matrix.T) / 2 + moved @ moved.T, samples
+
+
+def _scores(runs: Sequence[RunRows], sigma: Array) -> Array:
+    """Σ_t c_tᵀ Δτ_t/σ² (p, u) of the changes that all runs have in common."""
+    total: Array | float = 0.0
+    for run in runs:
+        if run.unsure is not None:
+            columns = np.where(run.usable[..., None], run.columns, 0.0) / np.square(sigma)[:, None]
+            if run.weights is not None:
+                columns = columns * run.weights[..., None]
+            total = total + np.einsum("mnp,umn->pu", columns, run.unsure)
+            forget()
+    return np.asarray(total) if np.ndim(total) else np.zeros((runs[0].columns.shape[2], 0))
 
 
 def _meat_of(shared: tuple[Array, Array, Array], run: RunRows, tell: Tell) -> tuple[Array, Array]:

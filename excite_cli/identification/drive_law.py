@@ -8,7 +8,8 @@ and rotor of every joint,
 
 *Delay.* At given gains φ and f follow linearly, friction and rotors not negative: a torque that
 comes later looks like less of a rotor. d minimises Σ_j n_j log RSS_j(d) / 2, its standard deviation
-is that of leaving out a tenth of the time each (jackknife).
+is that of leaving out a tenth of the time each (jackknife). That of when a set point comes between
+two samples is told with it (`hold_std`).
 
 *Gains.* All of kp, φ and f times one factor fit as well, so the noise is taken to be one of e, and
 what the description says of its masses (`inertial_prior`, 30 %) tells the factor:
@@ -22,6 +23,7 @@ carries little, friction and rotor take up what its gain would be.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from math import hypot
 
 import numpy as np
 from scipy.linalg import qr
@@ -37,7 +39,7 @@ from excite_cli.identification.prepare import prepare_all, smoothed
 from excite_cli.identification.processing import choose_processing
 from excite_cli.identification.regression import build_regression
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
-from excite_cli.measurement.torque_sources.command import Command, DriveLaw, law_of
+from excite_cli.measurement.torque_sources.command import Command, DriveLaw, hold_std, law_of
 from excite_cli.robot.model import Robot
 
 # What is used of long recordings: a delay and gains are known to a per mille by then.
@@ -133,21 +135,22 @@ def find_law(robot: Robot, base: BaseParameters, runs: Sequence[Run], spec: Spec
     """
     told = spec.measurement.command
     given = law_of(spec.measurement, robot.joint_names[robot.base_joints :])
-    rows = _Rows(robot, base, runs, spec)
+    rows, hold = _Rows(robot, base, runs, spec), max(map(hold_std, runs))
     if told.kp is not None:
         delay, deviation = rows.delay(given)
-        return FoundLaw(replace(given, delay=delay), deviation, None)
+        law = replace(given, delay=delay, delay_std=deviation)
+        return FoundLaw(law, hypot(deviation, hold), None)
     # Without kp, kd beside it would be of another size: viscous friction takes it up.
     law = replace(given, kd=np.zeros_like(given.kd), limit=np.full_like(given.limit, np.inf))
     law = replace(law, kp=rows.first_gains(law))
-    delay_std = None
     for _ in range(_ROUNDS if told.delay is None else 1):
         if told.delay is None:
-            delay, delay_std = rows.delay(law)
-            law = replace(law, delay=delay)
+            delay, deviation = rows.delay(law)
+            law = replace(law, delay=delay, delay_std=deviation)
         kp, gain_std = rows.gains(law)
         law = replace(law, kp=kp)
-    return FoundLaw(replace(law, kd=given.kd, limit=given.limit), delay_std, gain_std)
+    by_samples = None if told.delay is not None else hypot(law.delay_std, hold)
+    return FoundLaw(replace(law, kd=given.kd, limit=given.limit), by_samples, gain_std)
 
 
 class _Rows:

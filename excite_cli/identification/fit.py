@@ -122,18 +122,6 @@ class Fit(Shown):
         return slice(first, first + len(self.effects[index].parameters))
 
 
-def with_spread(found: Fit, other: Fit) -> Fit:
-    """The fit, as uncertain as it is by what set the data and is one standard deviation off.
-
-    `other` is the fit to these data made with that one standard deviation more: cov + Δ Δᵀ.
-    """
-    change = other.values - found.values
-    covariance = found.covariance + np.outer(change, change)
-    std = np.sqrt(np.diag(covariance))
-    ratio = np.divide(std, found.std, out=np.ones_like(std), where=found.std > 0.0)
-    return replace(found, covariance=covariance, std=std, relative_std=found.relative_std * ratio)
-
-
 def fit(
     regression: Regression,
     spec: IdentificationSpec | None = None,

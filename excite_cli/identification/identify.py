@@ -16,7 +16,7 @@ from excite_cli.identification.declared_states import (
 )
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.filter_bias import filter_findings, fitted_behind
-from excite_cli.identification.fit import Fit, effect_parameters, fit, with_spread
+from excite_cli.identification.fit import Fit, effect_parameters, fit
 from excite_cli.identification.hausman import (
     SIGNIFICANT,
     Hausman,
@@ -87,12 +87,8 @@ def identify(
     spec: Spec,
     held_out: str | None = None,
     tell: Tell = lambda text: None,
-    one_off: Sequence[Dataset] = (),
 ) -> Identification:
     """Fit the declared model of `spec` to all of `dataset` but the held-out part.
-
-    `one_off`: the same data if one of the figures that they are made with (the delay of set points)
-    was a standard deviation more; standard deviations hold what that changes.
 
     Raises
     ------
@@ -121,9 +117,6 @@ def identify(
     require_motion(prepared, processing, robot.joint_names, unmeasured)
     tell("fit")
     found = fit(training, spec.identification, (known.rows, known.target))
-    for data in one_off:
-        moved = regression_on(robot, base, effects, cut(data).training, processing)
-        found = with_spread(found, fit(moved, spec.identification, (known.rows, known.target)))
     tell("errors on the held-out part")
     kept = prepare_all(parts.held_out, processing, LeftOut.by(effects))
     if follows_model(training):

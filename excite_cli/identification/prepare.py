@@ -53,8 +53,9 @@ class PreparedRun:
     For fits every joint has averages of its own, which leave out invalid samples and those in
     which it stands or reverses; `tau_fit` (M, n) are those of the torque, `usable` (M, n) where
     enough is left. `rounding`: what is uncertain in them where torques are recorded in steps, per
-    joint (`rounding_of`). `before` (L, n): positions at the working rate until `t` begins. The
-    first `base_rows` joints are a base's.
+    joint (`rounding_of`); `unsure` (u, M, n): how `tau_fit` changes by one standard deviation of
+    each figure that torques are computed with. `before` (L, n): positions at the working rate until
+    `t` begins. The first `base_rows` joints are a base's.
     """
 
     run: RunId
@@ -75,6 +76,7 @@ class PreparedRun:
     start: float = 0.0
     covariates: Mapping[str, Array] = field(default_factory=dict)
     rounding: tuple[csr_matrix | None, ...] = ()
+    unsure: Array | None = None
     before: Array | None = None
     base_rows: int = 0
 
@@ -109,9 +111,10 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
             f"run '{run.label}': samples come at {fs:.3g} Hz, which no robot's log does. Check "
             "measurement.time."
         )
-    q = smoothed(run, processing)
-    if run.law is not None:
-        run = run.law.of_smooth(run, q)
+    q, unsure = smoothed(run, processing), list[Array]()
+    if (law := run.law) is not None:
+        run = law.of_smooth(run, q)
+        unsure = law.unsure(replace(run, q=q))
     border = int(np.ceil(processing.border * fs))
     stride = processing.working_stride
     inside = slice(border, len(run.t) - border)
@@ -144,7 +147,11 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
     to_full_rate = interpolation(len(t), stride, len(counted))
     tau, joints = run.tau[inside], range(run.q.shape[1])
     # Averages at the full rate are as large as all else together: one joint's at a time.
-    fit = [_averaged(without(of_torque, counted[:, j]), to_full_rate, run, tau, j) for j in joints]
+    unsure = [change[inside] for change in unsure]
+    fit = [
+        _averaged(without(of_torque, counted[:, j]), to_full_rate, run, tau, j, unsure)
+        for j in joints
+    ]
     every = np.ones(len(centers), dtype=bool)
     valid = [
         _JointAverages(averages, np.asarray(of_torque @ tau[:, j]), every)
@@ -173,6 +180,9 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
         covariates={name: values[keep] for name, values in run.covariates.items()},
         before=past[len(past) % stride :: stride],
         rounding=() if run.torque_step is None else tuple(each.rounding for each in fit),
+        unsure=np.stack([e.unsure for e in fit if e.unsure is not None], axis=2)
+        if unsure
+        else None,
     )
 
 
@@ -210,23 +220,43 @@ def _kept(run: PreparedRun, spool: Spool) -> PreparedRun:
 
 @dataclass(frozen=True)
 class _JointAverages:
-    """One joint's `averages` (M, T) at the working rate, of its torque (M,), and which are any."""
+    """One joint's `averages` (M, T) at the working rate, of its torque (M,), and which are any.
+
+    `unsure` (u, M): of changes of the torque.
+    """
 
     averages: csr_matrix
     tau: Array
     filled: NDArray[np.bool_]
     rounding: csr_matrix | None = None
+    unsure: Array | None = None
 
 
 def _averaged(
-    full: csr_matrix, to_full_rate: csr_matrix, run: Run | None, tau: Array, j: int
+    full: csr_matrix,
+    to_full_rate: csr_matrix,
+    run: Run | None,
+    tau: Array,
+    j: int,
+    changes: Sequence[Array] = (),
 ) -> _JointAverages:
-    """Of averages at the full rate; with `run`, what the steps of its torque leave uncertain."""
+    """Of averages at the full rate; with `run`, what the steps of its torque leave uncertain.
+
+    `changes` (T, n) of the torque likewise.
+    """
     own = (full @ to_full_rate).tocsr()
     rounding = None
     if run is not None and run.torque_step is not None and run.torque_step[j]:
         rounding = rounding_of(full, tau[:, j], float(run.torque_step[j]))
-    return _JointAverages(own, np.asarray(full @ tau[:, j]), filled(full) & filled(own), rounding)
+    unsure = np.stack([full @ change[:, j] for change in changes]) if changes else None
+    there = filled(full) & filled(own)
+    return _JointAverages(own, np.asarray(full @ tau[:, j]), there, rounding, unsure)
+
+
+def _stacked(changes: Sequence[Array | None]) -> Array | None:
+    """Those of all joints, (u, M, n)."""
+    there = [change for change in changes if change is not None]
+    return np.stack(there, axis=2) if there else None
 
 
 def smoothed(run: Run, processing: Processing) -> Array:

@@ -52,7 +52,7 @@ class RunColumns:
     def rows(self) -> RunRows:
         """Rows for the least-squares fit."""
         own = self.prepared
-        return RunRows(self.columns, self.tau, own.usable, rounding=own.rounding)
+        return RunRows(self.columns, self.tau, own.usable, rounding=own.rounding, unsure=own.unsure)
 
 
 @dataclass(frozen=True)

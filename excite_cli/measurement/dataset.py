@@ -30,6 +30,9 @@ class TorqueLaw(Protocol):
     def of_smooth(self, run: "Run", q: Array) -> "Run":
         """The run with the torque at smoothed positions q (T, n)."""
 
+    def unsure(self, run: "Run") -> list[Array]:
+        """Changes of τ (T, n) by one standard deviation of each figure of the law."""
+
 
 @dataclass(frozen=True)
 class Finding:
