@@ -135,7 +135,9 @@ class DriveLawSpec(Section):
         description="[s] of the drive's own loop, whose torque answers positions half of it later, "
         "give or take as much",
     )
-    limit: PerJoint | None = Field(None, description="[N·m] at which the drive's torque stops")
+    limit: PerJoint | None = Field(
+        None, description="[N·m] at which the drive's torque stops; default: found in the data"
+    )
 
 
 class MotorSpec(Section):

@@ -11,30 +11,37 @@ comes later looks like less of a rotor. d minimises Σ_j n_j log RSS_j(d) / 2, i
 is that of leaving out a tenth of the time each (jackknife). That of when a set point comes between
 two samples is told with it (`hold_std`).
 
+*Limits* that nobody told: of a drive that gives no more than L the law holds the excess besides,
+τ_j − clip(τ_j, ±L). Its column fits beside the model where there is such a limit, with a size of 1
+and much less left of the joint.
+
 *Gains.* All of kp, φ and f times one factor fit as well, so the noise is taken to be one of e, and
 what the description says of its masses (`inertial_prior`, 30 %) tells the factor:
 
     min over φ, f, κ = log kp of  Σ_j n_j log ‖e_j − ((Y φ)_j + F_j f_j) exp(−κ_j)‖ + prior(φ),
 
 n_j the samples that count, fewer than there are where what is left varies slowly, and the drives'
-gains taken to be within a factor of 1.6 of each other (one standard deviation): of a joint that
-carries little, friction and rotor take up what its gain would be.
+gains taken to be in proportion to the joints' largest torques within a factor of 1.8 (one standard
+deviation): of a joint that carries little, friction and rotor take up what its gain would be.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import hypot
+from typing import Any
 
 import numpy as np
-from scipy.linalg import qr
+from scipy.linalg import block_diag, qr
 from scipy.optimize import lsq_linear, minimize_scalar
 
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.inertial_prior import UNSURE, inertial_prior
-from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION, catalogue
+from excite_cli.effects.rare_sizes import half_of
+from excite_cli.identification.drive_gains import Gains, fit_gains
 from excite_cli.identification.prepare import prepare_all, smoothed
 from excite_cli.identification.processing import choose_processing
 from excite_cli.identification.regression import build_regression
@@ -48,30 +55,40 @@ _LONGEST = 0.06  # s: buses take 4 to 20 ms, a slow radio or a vision loop thric
 _GRID = 2e-3  # s
 _PARTS = 10  # of the time, of which each is left out once
 _NEAR = 1e-3  # s around the best delay, for the curvature
-_STEPS, _SETTLED = 30, 1e-4  # of Gauss and Newton; in log kp
 # One standard deviation of gains that were found: as far as the fit may move masses, or as they
 # are known, up to a factor of two.
 _GAIN_STD = (0.3, 1.0)
-_ALIKE = 0.5  # of log kp, one standard deviation: drives of a robot are of a few sizes
-_ROUNDS = 2  # of delay and gains in turn
+_ROUNDS = 2  # of delay and gains, or limits, in turn
+# Limits that are tried: quantiles of a joint's torque by the law, 1 last: none.
+_SHARES = np.array([0.3, 0.5, 0.6, 0.7, 0.8, 0.87, 0.92, 0.96, 0.98, 1.0])
+_SATURATED = 0.5  # of what is left of a joint without a limit: more is another effect's
+_FEWEST = 50  # usable samples of a joint
 _DRIVEN = 0.2  # rad off its set point at which a drive gives its joint's largest torque, usually
 
 
 @dataclass(frozen=True)
 class FoundLaw:
-    """The law, with one standard deviation of its delay [s] and of log kp (n,); None if told."""
+    """The law, with one standard deviation of its delay [s] and of log kp (n,); None if told.
+
+    `saturated`: joints, among the driven ones, with a limit that was found.
+    """
 
     law: DriveLaw
     delay_std: float | None
     gain_std: Array | None
+    saturated: tuple[int, ...] = ()
 
     def told(self, spec: Spec, joints: Sequence[str]) -> Spec:
         """The config that says so; gains that were found are as uncertain as masses are."""
         measured = spec.measurement
-        numbers = {"delay": float(f"{self.law.delay:.4g}")}
+        numbers: dict[str, Any] = {"delay": float(f"{self.law.delay:.4g}")}
+        if measured.command.limit is None:  # {}: there is none
+            finite = np.isfinite(self.law.limit)
+            each = zip(joints, self.law.limit, finite, strict=True)
+            numbers["limit"] = {name: float(f"{x:.4g}") for name, x, there in each if there}
         if self.gain_std is not None:
             kp = {name: float(f"{x:.4g}") for name, x in zip(joints, self.law.kp, strict=True)}
-            numbers["kp"] = kp  # type: ignore[assignment]
+            numbers["kp"] = kp
         command = measured.command.model_copy(update=numbers)
         identification = spec.identification
         if self.gain_std is not None and identification.gain_std is None:
@@ -94,6 +111,14 @@ class FoundLaw:
             )
             settings = {"measurement.command.delay": float(f"{self.law.delay:.4g}")}
             found.append(Finding("command_delay", "note", text, settings=settings))
+        for j in self.saturated:
+            limit = float(f"{self.law.limit[j]:.4g}")
+            text = (
+                f"the drive of {joints[j]} saturates at {limit:g} N·m, less than its set points "
+                f"ask for (measurement.command.limit: {{{joints[j]}: {limit:g}}})"
+            )
+            key = {"measurement.command.limit": {joints[j]: limit}}
+            found.append(Finding("drive_limit", "warning", text, joints=(joints[j],), settings=key))
         if self.gain_std is not None:
             each = [
                 f"{name} {kp:.3g} ± {kp * std:.2g}"
@@ -110,8 +135,9 @@ class FoundLaw:
 
 
 def is_sought(spec: MeasurementSpec) -> bool:
-    """Whether the config leaves a delay or gains of the drives to the data."""
-    return spec.torque == Command.name and None in (spec.command.kp, spec.command.delay)
+    """Whether the config leaves a delay, limits or gains of the drives to the data."""
+    told = spec.command.kp, spec.command.delay, spec.command.limit
+    return spec.torque == Command.name and None in told
 
 
 def with_law(data: Dataset, old: DriveLaw, new: DriveLaw) -> Dataset:
@@ -137,9 +163,18 @@ def find_law(robot: Robot, base: BaseParameters, runs: Sequence[Run], spec: Spec
     given = law_of(spec.measurement, robot.joint_names[robot.base_joints :])
     rows, hold = _Rows(robot, base, runs, spec), max(map(hold_std, runs))
     if told.kp is not None:
-        delay, deviation = rows.delay(given)
-        law = replace(given, delay=delay, delay_std=deviation)
-        return FoundLaw(law, hypot(deviation, hold), None)
+        law, deviation, told_delay = given, 0.0, told.delay is not None
+        saturated: tuple[int, ...] = ()
+        for _ in range(_ROUNDS):
+            if not told_delay:
+                delay, deviation = rows.delay(law)
+                law = replace(law, delay=delay, delay_std=deviation)
+            limit = rows.limits(law) if told.limit is None and not saturated else law.limit
+            saturated = tuple(map(int, np.flatnonzero(np.isfinite(limit) & np.isinf(given.limit))))
+            if not saturated:
+                break
+            law = replace(law, limit=limit)
+        return FoundLaw(law, None if told_delay else hypot(deviation, hold), None, saturated)
     # Without kp, kd beside it would be of another size: viscous friction takes it up.
     law = replace(given, kd=np.zeros_like(given.kd), limit=np.full_like(given.limit, np.inf))
     law = replace(law, kp=rows.first_gains(law))
@@ -147,9 +182,10 @@ def find_law(robot: Robot, base: BaseParameters, runs: Sequence[Run], spec: Spec
         if told.delay is None:
             delay, deviation = rows.delay(law)
             law = replace(law, delay=delay, delay_std=deviation)
-        kp, gain_std = rows.gains(law)
-        law = replace(law, kp=kp)
+        kp, half = rows.gains(law)
+        law = replace(law, kp=kp, gain_half=half)
     by_samples = None if told.delay is not None else hypot(law.delay_std, hold)
+    gain_std = np.sqrt(np.square(half).sum(axis=1))
     return FoundLaw(replace(law, kd=given.kd, limit=given.limit), by_samples, gain_std)
 
 
@@ -241,6 +277,33 @@ class _Rows:
 
         return left
 
+    def limits(self, law: DriveLaw) -> Array:
+        """Limits (n,) [N·m] of drives, those of the law and any that the data show."""
+        weights = 1.0 / self._noise(self._bounded(np.ones(self._robot.n))(self.torque(law)))
+        fit, found = self._bounded(weights), law.limit.copy()
+        for k in np.flatnonzero(np.isinf(law.limit)):
+            j = self._first + int(k)
+            sizes = np.abs(np.concatenate([law.torque(run)[:, j] for run in self._runs]))
+            grid = np.quantile(sizes, _SHARES)
+
+            def left(limit: float, k: int = int(k), j: int = j) -> float:
+                limits = np.where(np.arange(len(law.limit)) == k, limit, law.limit)
+                rest = fit(self.torque(replace(law, limit=limits)))
+                return float(np.sqrt(np.mean(np.square(rest[:, j]))))
+
+            if self._usable[:, j].sum() < _FEWEST or grid[0] <= 0.0:
+                continue
+            errors = [left(limit) for limit in grid]
+            best = int(np.argmin(errors))
+            if errors[best] > _SATURATED * errors[-1]:
+                continue
+            near = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
+            refined = minimize_scalar(
+                left, bounds=near, method="bounded", options={"xatol": 1e-4 * grid[best]}
+            )
+            found[k] = float(refined.x)
+        return found
+
     def first_gains(self, law: DriveLaw) -> Array:
         """kp (n,) with which every joint's torque is that of the description and some friction."""
         errors, cad = self.torque(replace(law, kp=np.ones_like(law.kp))), self._described()
@@ -252,27 +315,40 @@ class _Rows:
             slope = np.linalg.lstsq(beside, errors[rows, j], rcond=None)[0][0] if rows.any() else 0
             found.append(1.0 / slope if slope > 0.0 else np.nan)
         kp = np.array(found)
-        limits = self._robot.limits.effort[self._first :]
-        usual = np.where(np.isfinite(limits) & (limits > 0.0), limits, 1.0) / _DRIVEN
+        usual = self._usual()
         ratio = np.nanmedian(kp / usual) if np.isfinite(kp).any() else 1.0
         return np.where(np.isfinite(kp), kp, ratio * usual)
 
+    def _usual(self) -> Array:
+        """kp (n,) with which the largest torque of each joint goes with `_DRIVEN`."""
+        limits = self._robot.limits.effort[self._first :]
+        return np.where(np.isfinite(limits) & (limits > 0.0), limits, 1.0) / _DRIVEN
+
     def gains(self, law: DriveLaw) -> tuple[Array, Array]:
-        """kp (n,) [N·m/rad] and the standard deviations (n,) of its logarithm."""
+        """kp (n,) [N·m/rad], and H (n, n) with the covariance H Hᵀ of its logarithm."""
         errors = self.torque(law)[:, self._first :] / law.kp
         joints, prior = self._compact(errors), self._prior()
-        found = _fit_gains(joints, self._start(law.kp), prior)
-        found = _fit_gains(joints, found, prior, self._correlation(errors, found))
-        return np.exp(found.kappa), found.std
+        usual = np.log(self._usual())
+        found = fit_gains(joints, self._start(law.kp), prior, usual)
+        found = fit_gains(joints, found, prior, usual, self._correlation(errors, found))
+        return np.exp(found.kappa), found.half
 
-    def _start(self, kp: Array) -> "_Gains":
+    def _start(self, kp: Array) -> "Gains":
         theta = np.zeros(self._columns.shape[2])
         theta[: self._base.rank] = self._base.mapping @ standard_parameters(self._robot)
-        return _Gains(theta, np.log(kp), np.zeros_like(kp))
+        return Gains(theta, np.log(kp), np.zeros((len(kp), len(kp))))
 
     def _prior(self) -> tuple[Array, Array]:
-        prior = inertial_prior(self._robot, standard_parameters(self._robot), UNSURE)
-        return prior.on_base(self._base)
+        """Of the description, whose bodies are off as a whole as much as each figure beside it.
+
+        With independent figures alone a scale of all would be surer than masses of bodies are.
+        """
+        phi = standard_parameters(self._robot)
+        prior = inertial_prior(self._robot, phi, UNSURE)
+        bodies = UNSURE * block_diag(*phi.reshape(-1, PARAMETERS_PER_BODY))  # (bodies, P)
+        half = self._base.mapping @ np.column_stack([np.diag(prior.std), bodies.T])
+        whiten = np.linalg.inv(half_of(half @ half.T))
+        return np.asarray(whiten), np.asarray(whiten @ self._base.mapping @ phi)
 
     def _compact(self, errors: Array) -> list[tuple[Array, int]]:
         """Of each joint the triangle of [columns, e], which says as much, and its rows."""
@@ -283,7 +359,7 @@ class _Rows:
             found.append((qr(block, mode="r")[0][: block.shape[1]], max(int(rows.sum()), 1)))
         return found
 
-    def _correlation(self, errors: Array, found: "_Gains") -> Array:
+    def _correlation(self, errors: Array, found: "Gains") -> Array:
         """Samples (n,) that count as one, since what is left varies more slowly than noise."""
         lasting = []
         for k, j in enumerate(range(self._first, self._robot.n)):
@@ -308,72 +384,6 @@ class _Rows:
         """Columns of joint j that are not the bodies', those that it has."""
         own = self._columns[:, j, self._base.rank :]
         return np.asarray(own[:, np.abs(own).max(axis=0) > 0.0])
-
-
-@dataclass(frozen=True)
-class _Gains:
-    """Parameters theta (p,) of the textbook's model, κ = log kp (n,) and its deviations (n,)."""
-
-    theta: Array
-    kappa: Array
-    std: Array
-
-
-def _fit_gains(
-    joints: Sequence[tuple[Array, int]],
-    start: _Gains,
-    prior: tuple[Array, Array],
-    lasting: Array | None = None,
-) -> _Gains:
-    """The minimum over φ, f and κ by Gauss and Newton, steps halved until they lead down."""
-    n, rank, (whiten, target) = len(joints), len(prior[1]), prior
-    width = len(start.theta)
-    counts = np.array([m for _, m in joints]) / (1.0 if lasting is None else lasting)
-    alike = (np.eye(n) - 1.0 / n) / _ALIKE
-
-    def noise(x: Array) -> Array:
-        left = [np.linalg.norm(_left(own, x[:width], x[width + k])) for k, (own, _) in each]
-        return np.array(left) / np.sqrt([m for _, m in joints]) + 1e-12
-
-    def unlikely(x: Array) -> float:
-        off = whiten @ x[:rank] - target
-        return float(0.5 * off @ off)
-
-    def cost(x: Array) -> float:
-        differ = alike @ x[width:]
-        return float(counts @ np.log(noise(x))) + unlikely(x) + 0.5 * float(differ @ differ)
-
-    each = list(enumerate(joints))
-    x = np.concatenate([start.theta, start.kappa])
-    for _ in range(_STEPS):
-        weights = np.sqrt(counts / [m for _, m in joints]) / noise(x)
-        matrix, right = [], []
-        for k, (own, _) in each:
-            slope = own[:, :width] * np.exp(-x[width + k])
-            block = np.zeros((len(own), width + n))
-            block[:, :width], block[:, width + k] = slope, -slope @ x[:width]
-            matrix.append(block * weights[k])
-            right.append(_left(own, x[:width], x[width + k]) * weights[k])
-        known = np.zeros((rank + n, width + n))
-        known[:rank, :rank], known[rank:, width:] = whiten, alike
-        a = np.concatenate([*matrix, known])
-        b = np.concatenate([*right, target - whiten @ x[:rank], -alike @ x[width:]])
-        scale = np.maximum(np.linalg.norm(a, axis=0), 1e-30)
-        change = np.linalg.lstsq(a / scale, b, rcond=1e-10)[0] / scale
-        before, share = cost(x), 1.0
-        while cost(x + share * change) > before and share > 1e-3:
-            share *= 0.5
-        x = x + share * change
-        if float(np.abs(change[width:]).max()) < _SETTLED or share <= 1e-3:
-            break
-    inverse = np.linalg.pinv((a / scale).T @ (a / scale), hermitian=True)
-    std = np.sqrt(np.diag(inverse))[width:] / scale[width:]
-    return _Gains(x[:width], x[width:], std)
-
-
-def _left(own: Array, theta: Array, kappa: float) -> Array:
-    """What a joint's [columns, e] leave."""
-    return np.asarray(own[:, -1] - own[:, :-1] @ theta * np.exp(-kappa))
 
 
 def _first(runs: Sequence[Run]) -> list[Run]:

@@ -58,12 +58,16 @@ def check_joints(spec: MeasurementSpec, joints: tuple[str, ...], torques: bool =
         "offset": list(spec.offset),
         "without_torque": list(spec.without_torque),
         "angle": list(spec.angle) if isinstance(spec.angle, dict) else [],
-        "command.kd": list(spec.command.kd) if isinstance(spec.command.kd, dict) else [],
+        **{
+            f"command.{key}": list(value)
+            for key in ("kd", "limit")
+            if isinstance(value := getattr(spec.command, key), dict)
+        },
     }
     sizes: dict[str, object] = {
         key: getattr(spec, key) for key in ("gear_ratio", "torque_constant", "torque_unit")
     }
-    sizes |= {f"command.{key}": getattr(spec.command, key) for key in ("kp", "limit")}
+    sizes["command.kp"] = spec.command.kp
     sizes |= {f"motor.{key}": getattr(spec.motor, key) for key in ("resistance", "back_emf")}
     for key, value in sizes.items():
         if isinstance(value, dict):

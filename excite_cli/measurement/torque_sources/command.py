@@ -31,6 +31,7 @@ class DriveLaw:
     """`kp` [N·m/rad], `kd` [N·m·s/rad], `limit` [N·m] (∞ without one), each (n,).
 
     `delay` d of set points, its standard deviation and `lag` ε of what the drive answers [s].
+    `gain_half` (n, n) H: the logarithms of gains that were found have the covariance H Hᵀ.
     """
 
     kp: Array
@@ -39,6 +40,7 @@ class DriveLaw:
     delay: float
     lag: float = 0.0
     delay_std: float = 0.0
+    gain_half: Array | None = None
 
     def torque(self, run: Run) -> Array:
         """τ (T, n) [N·m] that the drives apply in a run with set points in its `extra`.
@@ -64,10 +66,15 @@ class DriveLaw:
         return replace(run, tau=run.tau + self.torque(smooth) - self.torque(run))
 
     def unsure(self, run: Run) -> list[Array]:
-        """Changes of τ (T, n) by one standard deviation: of the delay, and of ε."""
+        """Changes of τ (T, n) by one standard deviation: of the delay, of ε, and of gains."""
         later = self.delay + math.hypot(self.delay_std, hold_std(run))
         others, own = (replace(self, delay=later), replace(self, lag=0.0)), self.torque(run)
-        return [law.torque(run) - own for law in others]
+        changes = [law.torque(run) - own for law in others]
+        if self.gain_half is not None:
+            for change in self.gain_half.T:
+                changes.append(np.zeros_like(own))
+                changes[-1][:, run.base_rows :] = own[:, run.base_rows :] * change
+        return changes
 
 
 def hold_std(run: Run) -> float:
