@@ -42,7 +42,7 @@ from excite_cli.identification.regression import (
     regression_on,
 )
 from excite_cli.identification.split import Split, split
-from excite_cli.identification.torque_scale import assumed_scale, knowledge_of
+from excite_cli.identification.torque_scale import assumed_scale, knowledge_of, unseen_load
 from excite_cli.identification.torque_trace import TorqueTrace, torque_trace, torque_units
 from excite_cli.measurement.campaign_clock import Recorded, recorded
 from excite_cli.measurement.dataset import Dataset, Finding
@@ -142,6 +142,7 @@ def identify(
             *assumed_scale(spec.measurement, spec.identification),
             *standing_still(prepared, robot.joint_names),
             *_hardly_moved(found),
+            *unseen_load(spec.identification, _gains(found)),
             *_noticed(found, hausman),
             *biased,
             *_much_left(error),
@@ -188,6 +189,15 @@ def _hausman(
         return Hausman(False, str(error))
     rows, columns = [run.rows for run in training.runs], [run.columns for run in other.runs]
     return hausman_test(rows, columns, source, found.noise)
+
+
+def _gains(found: Fit) -> dict[str, float]:
+    """Gains that were found, by the joint."""
+    return {
+        found.joint_names[effect.joints[0]]: float(found.effect_values(i)[0])
+        for i, effect in enumerate(found.effects)
+        if effect.of_whole_torque
+    }
 
 
 def _much_left(error: Errors) -> list[Finding]:

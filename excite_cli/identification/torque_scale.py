@@ -9,7 +9,7 @@ or the whole robot where the wrench at its base is measured. A known payload's m
 inertia are independent; what they make of its ten parameters is taken to first order.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +40,7 @@ _ANY_GAIN = 0.3
 # Of a body that nobody described: radius of a sphere of its mass, and how wrong that may be [m].
 _RADIUS = 0.05
 _LEAST = 1e-4  # of the mass, and m: what was weighed and measured is no truer
+_NO_TORQUE = -0.9  # gain: a tenth of the torque is left, which no constant is wrong by
 _VISIBLE = 1e-6  # of a mass: what is more than rounding belongs to a mass that does not show
 
 
@@ -144,6 +145,19 @@ def assumed_scale(measurement: MeasurementSpec, spec: IdentificationSpec) -> lis
         "(identification.known_payload); identification.gain_std: 0.1 puts 10 % into every ±."
     )
     return [Finding("assumed_scale", "note", text)]
+
+
+def unseen_load(spec: IdentificationSpec, gains: Mapping[str, float]) -> list[Finding]:
+    """That what was weighed does not show: then gains of joints come out as nearly no torque."""
+    least = min(gains.values(), default=0.0)
+    if (spec.known_payload is None and spec.total_mass is None) or least > _NO_TORQUE:
+        return []
+    key = KNOWN_LOAD if spec.known_payload is not None else KNOWN_MASS
+    text = (
+        f"what was weighed ({key}) does not show in the torques: gains down to {least:+.0%} would "
+        "be needed. Is it on these runs and this link, and its mass in kg?"
+    )
+    return [Finding("unseen_load", "warning", text, joints=tuple(gains))]
 
 
 def known_body(spec: KnownPayloadSpec, robot: Robot) -> tuple[Effect, Array, Array]:
