@@ -59,9 +59,11 @@ _NEAR = 1e-3  # s around the best delay, for the curvature
 # are known, up to a factor of two.
 _GAIN_STD = (0.3, 1.0)
 _ROUNDS = 2  # of delay and gains, or limits, in turn
-# Limits that are tried: quantiles of a joint's torque by the law, 1 last: none.
+# Limits that are tried: quantiles of a joint's torque by the law, 1 last: none. A fifth of what the
+# description says and more: friction that is all of a joint's torque is no limit (Go2's calves).
 _SHARES = np.array([0.3, 0.5, 0.6, 0.7, 0.8, 0.87, 0.92, 0.96, 0.98, 1.0])
-_SATURATED = 0.5  # of what is left of a joint without a limit: more is another effect's
+_LEAST_LIMIT = 0.2
+_SATURATED = 0.5  # of the share that is left of a joint without a limit
 # Of a limit, RMS of what is left where it is reached: the model must ask for that torque there. A
 # payload that nobody declared had limits of 0.3 N·m on wrists, with 0.4 of it left.
 _AGREES = 0.15
@@ -288,26 +290,30 @@ class _Rows:
         for k in np.flatnonzero(np.isinf(law.limit)):
             j = self._first + int(k)
             sizes = np.abs(np.concatenate([law.torque(run)[:, j] for run in self._runs]))
+            least = _LEAST_LIMIT * float(self._robot.limits.effort[j])
             grid = np.quantile(sizes, _SHARES)
-            if self._usable[:, j].sum() < _FEWEST or grid[0] <= 0.0:
+            grid = grid[grid > (least if np.isfinite(least) else 0.0)]
+            if self._usable[:, j].sum() < _FEWEST or len(grid) < 2:
                 continue
 
-            def rest(limit: float, k: int = int(k), j: int = j) -> Array:
+            def rest(limit: float, k: int = int(k), j: int = j) -> tuple[Array, float]:
                 limits = np.where(np.arange(len(law.limit)) == k, limit, law.limit)
-                return fit(self.torque(replace(law, limit=limits)))[:, j]
+                tau = self.torque(replace(law, limit=limits))
+                left = fit(tau)[:, j]
+                return left, float(np.std(left) / np.std(tau[self._usable[:, j], j]))
 
-            errors = [float(np.std(rest(limit))) for limit in grid]
+            errors = [rest(limit)[1] for limit in grid]
             best = int(np.argmin(errors))
             if errors[best] > _SATURATED * errors[-1]:
                 continue
             limit = minimize_scalar(
-                lambda x, rest=rest: float(np.std(rest(x))),
+                lambda x, rest=rest: rest(x)[1],
                 bounds=(grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]),
                 method="bounded",
                 options={"xatol": 1e-4 * grid[best]},
             ).x
             there = self._usable[:, j] & (np.abs(free[:, j]) > limit)
-            off = float(np.sqrt(np.square(rest(limit)[there]).sum() / max(int(there.sum()), 1)))
+            off = float(np.sqrt(np.square(rest(limit)[0][there]).sum() / max(int(there.sum()), 1)))
             if there.sum() >= _FEWEST and off < _AGREES * limit:
                 found[k] = float(limit)
         return found

@@ -2,13 +2,14 @@
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from excite_cli import identify, load_case
 from excite_cli.api.drive_law import with_drive_law
-from excite_cli.api.loading import Case
+from excite_cli.api.loading import Case, load_data
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.identification.drive_law import FoundLaw, find_law, is_sought
 from excite_cli.measurement.dataset import Dataset
@@ -87,6 +88,15 @@ def test_a_drive_that_saturates_is_found_with_its_limit() -> None:
     assert found.told(told.spec, arm().joint_names).measurement.command.limit == {
         "shoulder_lift_joint": pytest.approx(found.law.limit[1], rel=1e-3)
     }
+
+
+def test_friction_that_is_all_of_a_torque_is_no_limit() -> None:
+    """A real Go2, whose calves carry little but their own friction."""
+    folder = Path(__file__).parents[2] / "data" / "go2"
+    found = law_of_log(load_data(load_case(folder / "go2.yaml"), [folder / "go2.h5"]),
+                       load_case(folder / "go2.yaml"))  # fmt: skip
+    assert not found.saturated
+    assert found.law.delay == pytest.approx(0.0087, abs=1e-3)
 
 
 def test_gains_are_found_with_the_scale_of_the_masses() -> None:
