@@ -154,7 +154,7 @@ def unseen_load(spec: IdentificationSpec, gains: Mapping[str, float]) -> list[Fi
         return []
     key = KNOWN_LOAD if spec.known_payload is not None else KNOWN_MASS
     text = (
-        f"what was weighed ({key}) does not show in the torques: gains down to {least:+.0%} would "
+        f"the known mass ({key}) does not show in the torques: gains down to {least:+.0%} would "
         "be needed. Is it on these runs and this link, and its mass in kg?"
     )
     return [Finding("unseen_load", "warning", text, joints=tuple(gains))]
