@@ -59,7 +59,7 @@ def with_worth(
         line = replace(line, kinds=tuple(own.values()))
         if len(own) > 1:  # the worth of one is known
             rest = [i for i in traced.chosen if i not in own]
-            worth, _ = worth_beside(held, traced, with_all, rest, (joint,))
+            worth = worth_beside(held, traced, with_all, rest, (joint,))
             parts = by_joint(names, np.sum([taken_off[i] for i in own], axis=0))
             line = replace(line, verdict=worth.verdict, removes=worth.removes, parts=parts)
         found.append(line)

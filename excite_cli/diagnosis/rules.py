@@ -38,18 +38,6 @@ RUNS_OF_A_DRIFT = 3
 
 # What is the answer -------------------------------------------------------------------------------
 
-# A model is better than another if it surely predicts data left out better, one-sided. Of answer
-# and textbook with 0.5 friction by load of 0.1 % that nobody had put in stayed in a simulated arm's
-# model; with 0.9 logs of real robots were predicted worse (KR300 split C 6.2 for 5.7 %, split A 6.1
-# for 5.0, TX40 8.2 for 7.8, UR10 6.6 for 6.5).
-CONFIDENCE = 0.6
-
-# More surely with one recording, of which what is left out is a part of the same motion. With 0.6,
-# 0.8 and 0.9: three robots of the battery 1.05, 0.76, 0.76 times the textbook, 1.69, 1.06, 1.07 and
-# 1.04, 1.13, 1.14; 35 others (geometric mean) 0.648 and 0.644; TX40 8.1, 8.1, 9.0 %, UR10 6.4, 6.5,
-# 6.4, Med 7 26, 24, 24.
-OF_ONE_RECORDING = 0.8
-
 # Errors whose ratio is below this are as good as each other: then the smaller model is the answer,
 # and what is above the textbook's by more is said to be worse.
 AS_GOOD = 1.02
@@ -74,6 +62,3 @@ IMAGINED = 0.01
 # confirmed in 43 robots of the battery without it one is surer (t of 3.6), three have t of 1.7 to
 # 2.3, three below 0.9.
 OF_A_NAME = 0.99
-
-# An effect does not make the held-out error of one of its joints larger by this factor.
-HIGHER = 1.1

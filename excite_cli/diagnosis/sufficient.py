@@ -139,8 +139,7 @@ def sufficient(traced: SearchResult, models: ModelComparison) -> list[int]:
     if models.difference(found, every).better:
         found = every
     best, larger = sorted((plain, found), key=lambda some: _width(traced, some))
-    gained = models.difference(best, larger)
-    if gained.better and gained.of_error > np.log(rules.AS_GOOD):
+    if models.difference(best, larger).of_error > np.log(rules.AS_GOOD):
         best = larger
     return those_that_matter(traced, best)
 

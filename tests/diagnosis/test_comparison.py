@@ -158,14 +158,6 @@ def test_what_acts_on_two_joints_must_be_missed_on_both(second: float, missed: b
     assert models.missed([0], [], (0, 1)) is missed
 
 
-def test_one_recording_asks_for_more() -> None:
-    """What is left out of it is a part of the same motion."""
-    given = traced_of([(effect("viscous_friction"), 1.0)])
-    one = alone(given, np.zeros(len(FOLDS) * SAMPLES))
-    several = models_of(given).difference([], [0]).confidence
-    assert models_of(one).difference([], [0]).confidence > several
-
-
 def test_a_quarter_of_the_travel_is_left_out_whenever_the_joint_is_there() -> None:
     """Not a quarter of the time: the seconds in the last quarter are all over the recording."""
     given = traced_of([(effect("payload"), 0.5)])

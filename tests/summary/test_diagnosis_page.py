@@ -56,9 +56,7 @@ def plain() -> Diagnosis:
 def diagnosis(plain: Diagnosis) -> Diagnosis:
     traces, held_out = make_traces(plain.joint_names)
     traces = replace(traces, runs=traces.runs[:1])
-    rest = replace(
-        plain.excess_residuals[0], depends_on=(Covariate("position", "elbow", True),)
-    )
+    rest = replace(plain.excess_residuals[0], depends_on=(Covariate("position", "elbow", True),))
     return replace(plain, traces=traces, held_out_traces=held_out, excess_residuals=(rest,))
 
 
