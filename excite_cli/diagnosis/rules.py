@@ -38,8 +38,8 @@ RUNS_OF_A_DRIFT = 3
 
 # What is the answer -------------------------------------------------------------------------------
 
-# Errors whose ratio is below this are as good as each other: then the smaller model is the answer,
-# and what is above the textbook's by more is said to be worse.
+# Errors on data left out, or held out, are alike where their ratio is below this: then the smaller
+# model is taken, and what is above the textbook's by more is said to be worse.
 AS_GOOD = 1.02
 
 # Friction and rotors stay on all joints unless the model says the same without them along a usual

@@ -2,7 +2,8 @@
 
 It is where the search begins, and what its answer must be better than. Everyday effects that
 a robot does not have cost what they are fitted to; so of the four sets with and without them the
-one is taken that predicts training data left out best (`comparison`).
+one is taken that predicts training data left out best, the smaller one where none is better
+(`comparison`).
 """
 
 from collections.abc import Sequence

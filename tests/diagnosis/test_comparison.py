@@ -94,7 +94,7 @@ def test_what_one_run_shows_is_not_in_a_new_recording() -> None:
     given = traced_of([(replace(effect("payload"), runs=("b",)), 0.5), (effect("armature"), 0.2)])
     models = models_of(given)
     assert models.difference([], [0]).size < 1.0
-    assert models.difference([], [1]).of_error > 0.0
+    assert models.difference([], [1]).size > 0.0
     # Of few recordings too. Every block takes the joint through all of its travel: the others know
     # what is in it.
     q = np.tile(np.linspace(0.0, 1.0, 50), len(FOLDS) * SAMPLES // 50)
