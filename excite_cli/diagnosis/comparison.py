@@ -10,8 +10,8 @@ the log-likelihood that is gained where the noise of a block is what is left of 
 error. The same blocks are in both, so that what no model explains does not count, and the logarithm
 makes blocks alike in which there is more or less of the same. Next to nothing is left of a block in
 which a joint hardly moves, and that says nothing: ε_j is a twentieth of what both leave of an
-average block. S' is better where D is 2 % of the error of every joint and block. A name is missed
-where D > t s, t of Student's distribution with B − 1 degrees of freedom.
+average block. S' is the better answer where D is 2 % of the error of every joint and block. A name
+is missed where D > t s, t of Student's distribution with B − 1 degrees of freedom.
 """
 
 from collections.abc import Collection, Sequence
