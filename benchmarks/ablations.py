@@ -32,14 +32,10 @@ OFF: dict[str, dict[str, float]] = {
     "FARTHER": {"FARTHER": NO},
     "LEAST_SIDE": {"LEAST_SIDE": 0.0},
     "RUNS_OF_A_DRIFT": {"RUNS_OF_A_DRIFT": 1},
-    "CONFIDENCE": {"CONFIDENCE": 0.5, "OF_ONE_RECORDING": 0.5},
-    "OF_ONE_RECORDING": {"OF_ONE_RECORDING": rules.CONFIDENCE},
     "AS_GOOD": {"AS_GOOD": 1.0},
     "MATTERS": {"MATTERS": NO},
-    "OF_WHAT_IS_LEFT": {"OF_WHAT_IS_LEFT": NO},
     "IMAGINED": {"IMAGINED": 0.0},
     "OF_A_NAME": {"OF_A_NAME": 1e-9},
-    "HIGHER": {"HIGHER": NO},
 }
 
 

@@ -10,8 +10,8 @@ the log-likelihood that is gained where the noise of a block is what is left of 
 error. The same blocks are in both, so that what no model explains does not count, and the logarithm
 makes blocks alike in which there is more or less of the same. Next to nothing is left of a block in
 which a joint hardly moves, and that says nothing: ε_j is a twentieth of what both leave of an
-average block. S' is better where D > t s, t of Student's distribution with B − 1 degrees of freedom
-at the one confidence, which is higher for one recording alone.
+average block. S' is the better answer where D is 2 % of the error of every joint and block. A name
+is missed where D > t s, t of Student's distribution with B − 1 degrees of freedom.
 """
 
 from collections.abc import Collection, Sequence
@@ -44,17 +44,11 @@ class Difference:
     error: float
     blocks: int
     joints: int
-    confidence: float
 
     @property
     def better(self) -> bool:
-        """Whether the second is better with the one confidence that is asked for."""
-        return self.size > float(student.ppf(self.confidence, self.blocks - 1)) * self.error
-
-    @property
-    def of_error(self) -> float:
-        """Logarithm of the ratio of RMS errors, mean over joints and blocks."""
-        return self.size / (2 * self.blocks * self.joints)
+        """Whether the second leaves clearly less, by the mean logarithm of the RMS errors."""
+        return self.size / (2 * self.blocks * self.joints) > np.log(rules.AS_GOOD)
 
 
 class ModelComparison:
@@ -78,7 +72,6 @@ class ModelComparison:
         turns = min(_GROUPS, max(blocks.count // 2, 2))
         self._same = evidence.in_groups(np.arange(blocks.count) % turns)
         recordings = len({part.run.name for part in data.runs})
-        self._confidence = rules.OF_ONE_RECORDING if recordings < 2 else rules.CONFIDENCE
         # As a new recording would be predicted: some joints, and the blocks with theirs left out.
         joints = list(range(data.n))
         if recordings >= _FEWEST_RUNS:
@@ -95,7 +88,7 @@ class ModelComparison:
             )
             for some in (one, other)
         )
-        return _difference(before, after, self._confidence)
+        return _difference(before, after)
 
     def missed(self, chosen: Sequence[int], rest: Sequence[int], rows: Sequence[int]) -> bool:
         """Whether seconds left out of the same recordings surely miss what `rest` lacks.
@@ -105,22 +98,23 @@ class ModelComparison:
         """
         before, after = (self._same.energies(self._at(some)) for some in (rest, chosen))
         if len(rows) > 1:
-            gains = [_difference(before[[j]], after[[j]], rules.OF_A_NAME).size for j in rows]
+            gains = [_difference(before[[j]], after[[j]]).size for j in rows]
             others = [j for j in rows if j != rows[int(np.argmax(gains))]]
             before, after = before[others], after[others]
-        return _difference(before, after, rules.OF_A_NAME).better
+        found = _difference(before, after)
+        return found.size > float(student.ppf(rules.OF_A_NAME, found.blocks - 1)) * found.error
 
     def _at(self, some: Sequence[int]) -> list[int]:
         """Where candidates are among the members."""
         return [self._place[i] for i in some]
 
 
-def _difference(before: Array, after: Array, confidence: float) -> Difference:
+def _difference(before: Array, after: Array) -> Difference:
     joints, blocks = before.shape
     least = _LEAST * ((before + after) / 2.0).mean(axis=1, keepdims=True) + 1e-300
     gained: Array = np.log((before + least) / (after + least)).sum(axis=0)
     error = float(np.sqrt(blocks) * gained.std(ddof=1)) if blocks > 1 else np.inf
-    return Difference(float(gained.sum()), error, blocks, joints, confidence)
+    return Difference(float(gained.sum()), error, blocks, joints)
 
 
 def _cut(data: TrainingData) -> tuple[BlocksOfTime, NDArray[np.intp]]:

@@ -1,8 +1,7 @@
-"""What a residual may depend on: a quantity, of which joint, and how it enters."""
+"""What a residual may depend on: a quantity, of which joint, by its value or its history."""
 
 import re
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Any, Literal, Self
 
 from pydantic_core import core_schema
@@ -23,17 +22,12 @@ _SYMBOLS: dict[Source, str] = {
 _OF_SYMBOLS = {symbol: quantity for quantity, symbol in _SYMBOLS.items()}
 
 
-class Aspect(StrEnum):
-    """How a quantity enters: by its value, by where it came from, with the direction of motion."""
-
-    VALUE = ""
-    HISTORY = "history of "
-    DIRECTION = "direction and "
+_HISTORY = "history of "
 
 
 @dataclass(frozen=True)
 class Covariate:
-    """`quantity` of `joint`; `own` stands for that of whichever joint is looked at.
+    """`quantity` of `joint`, or its `history`; `own` stands for whichever joint is looked at.
 
     Time, and which run it is, belong to no joint; of a further column of the log, `joint` is its
     name.
@@ -41,30 +35,27 @@ class Covariate:
 
     quantity: Source
     joint: str = ""
-    aspect: Aspect = Aspect.VALUE
+    history: bool = False
     own: bool = False
 
     @property
     def like(self) -> Source:
         """The quantity of which an effect would be a function: hysteresis is one of motion."""
-        if self.quantity == "position" and self.aspect is not Aspect.VALUE:
-            return "speed"
-        return self.quantity
+        return "speed" if self.quantity == "position" and self.history else self.quantity
 
     @property
     def common(self) -> "Covariate":
-        """The same for every joint: direction, history and load are each joint's own."""
-        if self.quantity == "covariate" or (
-            self.aspect is Aspect.VALUE and self.quantity != "load"
-        ):
+        """The same for every joint: history and load are each joint's own."""
+        if not (self.history or self.quantity == "load"):
             return self
-        return Covariate(self.quantity, "", self.aspect, own=True)
+        return Covariate(self.quantity, "", self.history, own=True)
 
     @property
     def code(self) -> str:
         """As files and JSON have it: `time`, `q[elbow]`, `history of load[elbow]`, `own load`."""
         joint = f"[{self.joint}]" if self.joint else ""
-        return f"{'own ' if self.own else ''}{self.aspect}{_SYMBOLS[self.quantity]}{joint}"
+        how = "own " * self.own + _HISTORY * self.history
+        return f"{how}{_SYMBOLS[self.quantity]}{joint}"
 
     @classmethod
     def of_code(cls, code: str) -> Self:
@@ -78,8 +69,8 @@ class Covariate:
         found = _CODE.fullmatch(code)
         if found is None:
             raise ValueError(f"'{code}' is nothing that a residual may depend on")
-        own, aspect, symbol, joint = found.groups()
-        return cls(_OF_SYMBOLS[symbol], joint or "", Aspect(aspect or ""), bool(own))
+        own, history, symbol, joint = found.groups()
+        return cls(_OF_SYMBOLS[symbol], joint or "", bool(history), bool(own))
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> core_schema.CoreSchema:
@@ -87,6 +78,4 @@ class Covariate:
         return core_schema.no_info_plain_validator_function(cls.of_code)
 
 
-_CODE = re.compile(
-    rf"(own )?({'|'.join(filter(None, Aspect))})?({'|'.join(_OF_SYMBOLS)})(?:\[(.+)\])?"
-)
+_CODE = re.compile(rf"(own )?({_HISTORY})?({'|'.join(_OF_SYMBOLS)})(?:\[(.+)\])?")

@@ -17,13 +17,12 @@ import numpy as np
 from excite_cli.diagnosis.final_fit import FinalFit
 from excite_cli.diagnosis.held_out_errors import HeldOutRuns
 from excite_cli.diagnosis.held_out_verdict import worth_beside
-from excite_cli.diagnosis.modelled_run import places_of
 from excite_cli.diagnosis.records import FrictionLine, by_joint
 from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.effects.catalogue import straight_friction
 from excite_cli.effects.parameter import Value, deviation
 from excite_cli.identification.identified_model import Prediction
-from excite_cli.identification.regression import effect_columns
+from excite_cli.identification.regression import effect_columns, places_of
 from excite_cli.robot.model import Array
 
 _ROUNDING = 1e-9  # of a line of friction that has no such part
@@ -59,7 +58,7 @@ def with_worth(
         line = replace(line, kinds=tuple(own.values()))
         if len(own) > 1:  # the worth of one is known
             rest = [i for i in traced.chosen if i not in own]
-            worth, _ = worth_beside(held, traced, with_all, rest, (joint,))
+            worth = worth_beside(held, traced, with_all, rest, (joint,))
             parts = by_joint(names, np.sum([taken_off[i] for i in own], axis=0))
             line = replace(line, verdict=worth.verdict, removes=worth.removes, parts=parts)
         found.append(line)

@@ -88,11 +88,6 @@ _OPEN = Finding(
 )
 
 
-def _never(chosen: Sequence[int], rest: Sequence[int], rows: Sequence[int]) -> bool:
-    """No data left out miss what a wrong set-up may stand for."""
-    return False
-
-
 def diagnose(
     robot: Robot,
     base: BaseParameters,
@@ -167,9 +162,8 @@ def diagnose(
     taken_off = error_parts(traced, errors)
     held = HeldOutRuns(robot, [*kept, *prepare_all(parts.ends, processing)])
     with_all = held.predictions(models[1])
-    missed = compared.missed if compared else None
-    if is_open:
-        missed = _never
+    # No data left out miss what a wrong set-up may stand for.
+    missed = (lambda *_: False) if is_open else compared.missed if compared else None
     worth = worth_on_held_out(held, traced, with_all, signal_to_error(traced, final), missed)
     links = spec.diagnosis.carrying_links
     named, rivals = named_effects(traced, final, doubts, worth, taken_off, links)

@@ -10,10 +10,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from excite_cli.diagnosis.candidates import Candidate
-from excite_cli.diagnosis.modelled_run import places_of
 from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.diagnosis.traces import EffectTrace
 from excite_cli.effects.base import Effect
+from excite_cli.identification.regression import places_of
 from excite_cli.identification.torque_trace import single
 from excite_cli.robot.model import Array
 

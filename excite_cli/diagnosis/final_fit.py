@@ -16,12 +16,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.diagnosis.modelled_run import places_of, width_of
 from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.effects.rare_sizes import half_of
 from excite_cli.identification.factors import Mask
 from excite_cli.identification.fit import usual_sizes
 from excite_cli.identification.least_squares import LinearFit, fit_rows
+from excite_cli.identification.regression import places_of, width_of
 from excite_cli.robot.model import Array
 
 # Relative sd of every size, beside what noise says: filters, differentiated positions and motion

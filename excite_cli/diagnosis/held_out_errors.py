@@ -20,7 +20,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.diagnosis.modelled_run import places_of, width_of
 from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
@@ -29,7 +28,13 @@ from excite_cli.identification.averages import apply
 from excite_cli.identification.errors_of_torque import FEWEST, Errors
 from excite_cli.identification.identified_model import IdentifiedModel, Prediction, errors_on
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.identification.regression import effect_columns, seen_of, with_effects
+from excite_cli.identification.regression import (
+    effect_columns,
+    places_of,
+    seen_of,
+    width_of,
+    with_effects,
+)
 from excite_cli.identification.torque_trace import TorqueTrace, torque_trace
 from excite_cli.robot.model import Array, Robot
 from excite_cli.workers.base import Tell
@@ -129,7 +134,7 @@ class _Fit:
         self.effects = (*model.declared, *found)
         self._held = model.by_urdf if from_urdf else np.zeros(0)
         self._fixed = traced.data.declared[0].shape[2]
-        self._count = self._fixed + sum(len(effect.parameters) for effect in found)
+        self._count = self._fixed + width_of(found)
         self._at = dict(zip(chosen, places_of(found, self._count), strict=True))
 
     def parameters(self, joined: tuple[int, ...]) -> Array:

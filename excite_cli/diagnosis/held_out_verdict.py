@@ -5,9 +5,9 @@ would take its place. What the effect removes is the difference of the mean rela
 torque, where joints move: of one that stands the stiction may be any, and no model says it. Blocks
 of the held-out part are drawn with replacement, the same for both errors, and say whether it is
 above or below zero beyond chance. An effect of several joints is confirmed where it removes error
-from those, too, that are not the one from which it removes most, and adds it on none. What only
-weighing tells from the inertias is not judged by this error, unless it rises on a joint: inertias
-would take it up and predict as well. Nothing is chosen or fitted by this.
+from those, too, that are not the one from which it removes most. What only weighing tells from the
+inertias is not judged by this error: inertias would take it up and predict as well. Nothing is
+chosen or fitted by this.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.held_out_errors import HeldOutRuns, refitted
 from excite_cli.diagnosis.records import ErrorReduction
 from excite_cli.diagnosis.search_result import SearchResult
@@ -60,9 +59,9 @@ def worth_on_held_out(
     for i in traced.chosen:
         rest = traced.judge.without(i, traced.chosen)
         joints = traced.candidates[i].effect.joints
-        worth, rises = worth_beside(held, traced, with_all, rest, joints)
+        worth = worth_beside(held, traced, with_all, rest, joints)
         verdict = worth.verdict
-        if traced.judge.identified_by_prior_only(i, rest) and not rises:
+        if traced.judge.identified_by_prior_only(i, rest):
             verdict = HeldOutVerdict.WEIGHED
         elif verdict is HeldOutVerdict.CONFIRMED:
             named = (
@@ -82,30 +81,19 @@ def worth_beside(
     with_all: Sequence[Prediction],
     rest: Sequence[int],
     joints: Sequence[int],
-) -> tuple[Worth, bool]:
-    """What all candidates but the `rest` are worth, which act on some joints.
-
-    And whether they raise the error of one of these.
-    """
+) -> Worth:
+    """What all candidates but the `rest` are worth, which act on some joints."""
     without = held.predictions(refitted(traced, rest))
     errors_without, errors = held.errors(without), held.errors(with_all)
     lower = errors_without.mean_relative - errors.mean_relative
     verdict = held_out_verdict(removed_in_draws(held.runs, without, with_all), lower)
-    on = [held.robot.joint_names[j] for j in joints]
-    rises = rises_on_one(on, errors_without, errors)
     if verdict is HeldOutVerdict.CONFIRMED and len(joints) > 1:
+        on = [held.robot.joint_names[j] for j in joints]
         gains = [errors_without.relative[name] - errors.relative[name] for name in on]
         best = joints[int(np.argmax(np.nan_to_num(gains)))]
         others = removed_in_draws(held.runs, without, with_all, beside=best)
         verdict = held_out_verdict(others, lower)
-    if verdict is HeldOutVerdict.CONFIRMED and rises:
-        verdict = HeldOutVerdict.NOT_CONFIRMED
-    return Worth(verdict, _removes(errors_without, errors)), rises
-
-
-def rises_on_one(joints: Sequence[str], without: Errors, with_it: Errors) -> bool:
-    """Whether the error of one of the joints that an effect acts on is clearly higher with it."""
-    return any(with_it.relative[name] > rules.HIGHER * without.relative[name] for name in joints)
+    return Worth(verdict, _removes(errors_without, errors))
 
 
 def held_out_verdict(removed: Array, lower: float) -> HeldOutVerdict:

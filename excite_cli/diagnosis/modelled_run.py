@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from excite_cli.identification.regression import (
     effect_columns,
     for_base_columns,
     seen_of,
+    width_of,
     with_effects,
 )
 from excite_cli.out_of_core import Spool
@@ -77,18 +77,6 @@ class DeclaredModel:
         """Full φ (P,) nearest to the URDF's that agrees with the fitted inertial parameters."""
         nearest = inertial_prior(self.robot, standard_parameters(self.robot), 1.0)
         return nearest.completed(self.base, parameters[: self.base.rank])
-
-
-def width_of(effects: Sequence[Effect]) -> int:
-    """Number of linear parameters of effects."""
-    return sum(len(effect.parameters) for effect in effects)
-
-
-def places_of(effects: Sequence[Effect], count: int) -> list[slice]:
-    """Where the linear parameters of each effect are: together they are the last of `count`."""
-    widths = [len(effect.parameters) for effect in effects]
-    edges = (count - sum(widths) + np.cumsum([0, *widths])).tolist()
-    return [slice(start, end) for start, end in pairwise(edges)]
 
 
 class ModelledRun:

@@ -14,7 +14,6 @@ from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.final_fit import FinalFit
 from excite_cli.diagnosis.held_out_verdict import Worth
 from excite_cli.diagnosis.misspecification import explained
-from excite_cli.diagnosis.modelled_run import places_of
 from excite_cli.diagnosis.records import (
     Approximation,
     EffectRecord,
@@ -31,6 +30,7 @@ from excite_cli.diagnosis.words import joints_in_words
 from excite_cli.effects.base import Place
 from excite_cli.effects.placing import told_on
 from excite_cli.excitation.prediction import may_be_planned_for
+from excite_cli.identification.regression import places_of
 from excite_cli.robot.model import Array
 
 # The way from the declared model to the diagnosis, one effect at a time.

@@ -8,6 +8,7 @@ from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.extrapolation import Reach
 from excite_cli.effects.base import Effect
 from excite_cli.effects.judgement import Seen
+from excite_cli.identification.regression import places_of
 from excite_cli.robot.model import Array
 
 _ERRORS = 2.0  # deviations by which what is there may be less than what is taken
@@ -40,13 +41,13 @@ class PossibleSizes:
 
     def why_not(self, parameters: Array, chosen: Sequence[int], added: Sequence[int]) -> str:
         """Why something `added` cannot be so; empty if all can."""
-        start = len(parameters) - sum(self._candidates[i].width for i in chosen)
-        for i in chosen:
-            own = slice(start, start + self._candidates[i].width)
-            start = own.stop
+        effects = [self._candidates[i].effect for i in chosen]
+        for i, effect, own in zip(
+            chosen, effects, places_of(effects, len(parameters)), strict=True
+        ):
             if i not in added:
                 continue
-            effect, values = self._candidates[i].effect, parameters[own]
+            values = parameters[own]
             reason = effect.absurd(values, self._seen)
             if not reason and not effect.possible(values):
                 if len(values) == 1 and type(effect).nearest is Effect.nearest:
@@ -83,15 +84,8 @@ class PossibleSizes:
     ) -> list[int]:
         """Parameters, of `count`, that are the size of a kind on these joints in all runs."""
         effects = [*self._declared, *(self._candidates[i].effect for i in chosen)]
-        at = count - sum(len(each.parameters) for each in effects)
-        found = []
-        for each in effects:
-            if each.kind == kind and each.joints == joints and not each.runs:
-                found.append(at)
-            at += len(each.parameters)
-        return found
-
-
-def spread_of(covariance: Spread, inflation: float) -> Spread:
-    """`inflation` times `covariance`."""
-    return lambda chosen, directions: inflation * covariance(chosen, directions)
+        return [
+            own.start
+            for each, own in zip(effects, places_of(effects, count), strict=True)
+            if each.kind == kind and each.joints == joints and not each.runs
+        ]

@@ -13,8 +13,8 @@ that it is named with the power
     P(χ²₁(z²/s²) > c) = Φ(z/s − √c) + Φ(−z/s − √c),
 
 and the size that is named with 95 % is about s (√c + 1.645). What a diagnosis holds out is no part
-of the motions. Nor does it name what its rules say is too small to matter (`least_share`), however
-surely it is there.
+of the motions. Nor does it name what is too small to need one (`rules.SMALLEST`), however surely it
+is there.
 """
 
 from dataclasses import dataclass
@@ -88,7 +88,7 @@ def power_of(
         if effect.kind == kind:
             times = size / scale / deviation
             chance = _chance(times, price(type(effect), significance))
-            if share * size / scale < (1.0 - _ROUNDING) * least_share(prediction, effect):
+            if share * size / scale < (1.0 - _ROUNDING) * rules.SMALLEST:
                 chance = 0.0
             found.append(_record(prediction, effect, size, share * size / scale, chance, times))
     return tuple(found)
@@ -100,8 +100,8 @@ def least_sizes(prediction: Prediction, kind: str) -> tuple[EffectPower, ...]:
     for at in range(len(prediction.extension.effects)):
         effect, scale, share = _about(prediction, at)
         if effect.kind == kind:
-            least = least_share(prediction, effect)
-            found.append(_record(prediction, effect, least / share * scale, least, 1.0, np.inf))
+            size = rules.SMALLEST / share * scale
+            found.append(_record(prediction, effect, size, rules.SMALLEST, 1.0, np.inf))
     return tuple(found)
 
 
@@ -136,23 +136,9 @@ def _shown(
     effect, scale, share = _about(prediction, at)
     cost = price(type(effect), significance)
     size = times_named(cost, power) * deviation if np.isfinite(deviation) else float("inf")
-    size = max(size, least_share(prediction, effect) / share)
+    size = max(size, rules.SMALLEST / share)
     times = size / deviation if np.isfinite(deviation) else 0.0
     return _record(prediction, effect, size * scale, size * share, power, times)
-
-
-def least_share(prediction: Prediction, effect: Effect) -> float:
-    """Share of its joint's usual torque, RMS, below which a diagnosis names no such effect.
-
-    What every robot has must also make an error of its joint noticeably larger, or matter.
-    """
-    if effect.kind not in _TEXTBOOK:
-        return rules.SMALLEST
-    robot = prediction.extension.robot
-    rows = {int(row): k for k, row in enumerate(robot.rows)}
-    own = [rows[int(robot.moved[j])] for j in effect.rows(robot.n) if int(robot.moved[j]) in rows]
-    of_left = rules.OF_WHAT_IS_LEFT * float(prediction.noise[own].min())
-    return max(rules.SMALLEST, min(rules.MATTERS, of_left))
 
 
 def times_named(cost: float, power: float) -> float:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.linalg.blas import dsymv
 from scipy.linalg.lapack import dpotrf, dpotri
 
-from excite_cli.diagnosis.covariate import Aspect, Covariate
+from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Signals
 from excite_cli.robot.model import Array
@@ -220,8 +220,8 @@ class Quantities:
             yield Covariate("speed", name), [x[:, k, None] for x in self._v]
             yield Covariate("acceleration", name), [x[:, k, None] for x in self._a]
         yield Covariate("load", own), [x[:, joint, None] for x in self._load]
-        yield Covariate("position", own, Aspect.HISTORY), [x[:, joint] for x in self._past_q]
-        yield Covariate("load", own, Aspect.HISTORY), [x[:, joint] for x in self._past_load]
+        yield Covariate("position", own, True), [x[:, joint] for x in self._past_q]
+        yield Covariate("load", own, True), [x[:, joint] for x in self._past_load]
 
     def _rows(self, joint: int) -> tuple[list[NDArray[np.intp]], NDArray[np.intp]]:
         """Samples of every part, and the second that each of them is in (all parts in a row).

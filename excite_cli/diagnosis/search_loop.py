@@ -28,7 +28,7 @@ from excite_cli.diagnosis.modelled_run import (
 )
 from excite_cli.diagnosis.noise_model import NoiseModel, fit_noise
 from excite_cli.diagnosis.placebo import placebos_of
-from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
+from excite_cli.diagnosis.possible_sizes import PossibleSizes
 from excite_cli.diagnosis.search import CandidateSearch
 from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.diagnosis.textbook import everyday, textbook_effects
@@ -43,6 +43,7 @@ from excite_cli.effects.judgement import Seen
 from excite_cli.identification.declared_states import LeftOut, declared_sets
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.prior import as_wide_as_needed
+from excite_cli.identification.regression import width_of
 from excite_cli.robot.model import Array
 
 _PASSES = 5  # with four, the level of a cut torque was 1.1 % off
@@ -221,7 +222,7 @@ def _first_fit(
     """The declared model with these effects, rows weighted by what it leaves."""
     known = (*model.declared, *effects)
     phi = standard_parameters(model.robot)
-    values = np.zeros(sum(len(effect.parameters) for effect in known))
+    values = np.zeros(width_of(known))
     levels = np.ones(model.robot.n)
     for _ in range(3):
         signals = signals_of_all(bodies, phi, known, values)
@@ -316,7 +317,7 @@ def _one_pass(
     motion = UsualMotion(model.robot, fit.phi, signals)
     sizes = PossibleSizes(
         candidates,
-        spread_of(white.covariance, inflation),
+        lambda some, directions: inflation * white.covariance(some, directions),
         _seen(data, signals),
         model.declared,
         Reach(candidates, data, motion, everyday(candidates)),

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from excite_cli.diagnosis.candidates import record_of
 from excite_cli.diagnosis.held_out_errors import HeldOutRuns
-from excite_cli.diagnosis.modelled_run import DeclaredModel, places_of
+from excite_cli.diagnosis.modelled_run import DeclaredModel
 from excite_cli.diagnosis.records import Assumption, HeldOutEnds
 from excite_cli.diagnosis.search_loop import differences
 from excite_cli.diagnosis.search_result import SearchResult
@@ -21,6 +21,7 @@ from excite_cli.effects.base import Effect
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import Processing
+from excite_cli.identification.regression import places_of
 from excite_cli.identification.split import Split
 from excite_cli.measurement.dataset import Finding, Run
 from excite_cli.robot.model import Robot

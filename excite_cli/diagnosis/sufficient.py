@@ -34,8 +34,8 @@ from excite_cli.robot.model import Array
 #
 # with P the covariance of all parameters, θ and s = √(eᵀ P e) size and deviation of this one (the
 # unit vector e), and c_j the columns of joint j, is below a fiftieth and, of what is surely there,
-# also below a fifth of what the model leaves. Not so defects of the measurement, of which many
-# robots have none: with offsets a UR10 of the battery was left with 14.8 % for 7.4.
+# below what needs a name at all. Not so defects of the measurement, of which many robots have none:
+# with offsets a UR10 of the battery was left with 14.8 % for 7.4.
 
 _ITS_OWN = 1e-6  # of a column's energy: what the model leaves of less is rounding
 _DEVIATIONS = 2.0
@@ -65,15 +65,18 @@ def those_that_matter(traced: SearchResult, chosen: Sequence[int]) -> list[int]:
     judge, found = traced.judge, list(chosen)
     elsewhere = _Elsewhere(traced, found)
     common = set(everyday(traced.candidates))
+
+    def least(i: int) -> float:
+        there = judge.p_value(i, judge.white.gain_of(i, found)) <= judge.rules.significance
+        return rules.SMALLEST if there else rules.MATTERS
+
     while True:
-        theta, most = traced.fitted(found), elsewhere.most(found)
-        leaving = {}
-        for i in common.intersection(found):
-            matters, of_left = most[i]
-            there = judge.p_value(i, judge.white.gain_of(i, found)) <= judge.rules.significance
-            stays = matters or (there and of_left > rules.OF_WHAT_IS_LEFT)
-            if not stays or not judge.allowed(theta, found, [i]):
-                leaving[i] = of_left
+        theta, shares = traced.fitted(found), elsewhere.shares(found)
+        leaving = {
+            i: shares[i]
+            for i in common.intersection(found)
+            if not (shares[i] > least(i) and judge.allowed(theta, found, [i]))
+        }
         if not leaving:
             return found
         gone = weakest_apart(leaving, lambda i: traced.candidates[i].rows)
@@ -91,13 +94,9 @@ class _Elsewhere:
         self._place = {int(column): k for k, column in enumerate(columns)}
         torque = torque_seen(traced.data)
         self._torque = np.where(torque > 0.0, torque, np.inf)  # nothing is known of other joints
-        self._left = np.where(torque > 0.0, traced.levels, np.inf)
 
-    def most(self, chosen: Sequence[int]) -> dict[int, tuple[bool, float]]:
-        """Whether the model may say otherwise elsewhere without each of the chosen ones.
-
-        And by how much it may along the usual motion, a share of what it leaves of a joint.
-        """
+    def shares(self, chosen: Sequence[int]) -> dict[int, float]:
+        """u of each of the chosen: how much the model may say otherwise without it."""
         traced, white = self._traced, self._traced.judge.white
         theta = traced.judge.plain.solve(chosen)
         covariance = traced.inflation * white.covariance(chosen)
@@ -108,8 +107,7 @@ class _Elsewhere:
             own = slice(start, start + traced.candidates[i].width)
             start = own.stop
             there = _otherwise(usual, covariance[:, own], covariance[own, own], theta[own])
-            matters = bool((there > rules.MATTERS * self._torque).any())
-            found[i] = matters, float((there / self._left).max())
+            found[i] = float((there / self._torque).max())
         return found
 
 
@@ -141,8 +139,7 @@ def sufficient(traced: SearchResult, models: ModelComparison) -> list[int]:
     if models.difference(found, every).better:
         found = every
     best, larger = sorted((plain, found), key=lambda some: _width(traced, some))
-    gained = models.difference(best, larger)
-    if gained.better and gained.of_error > np.log(rules.AS_GOOD):
+    if models.difference(best, larger).better:
         best = larger
     return those_that_matter(traced, best)
 

@@ -2,8 +2,7 @@
 
 It is where the search begins, and what its answer must be better than. Everyday effects that
 a robot does not have cost what they are fitted to; so of the four sets with and without them the
-one is taken that predicts training data left out best, the smaller one where none is surely better
-(`comparison`).
+one is taken that predicts training data left out best (`comparison`).
 """
 
 from collections.abc import Sequence
@@ -35,7 +34,7 @@ def textbook(candidates: Sequence[Candidate], models: ModelComparison) -> list[i
     for more in product((False, True), repeat=len(EVERYDAY)):
         kinds = [kind for kind, taken in zip(EVERYDAY, more, strict=True) if taken]
         chosen = _of(candidates, (*EVERYDAY_FRICTION, *kinds))
-        if best is None or models.difference(best, chosen).better:
+        if best is None or models.difference(best, chosen).size > 0.0:
             best = chosen
     assert best is not None
     return best

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from excite_cli.diagnosis.covariate import Aspect, Covariate, Source
+from excite_cli.diagnosis.covariate import Covariate, Source
 from excite_cli.diagnosis.records import (
     Approximation,
     Assumption,
@@ -179,9 +179,7 @@ def covariate_in_words(covariate: Covariate) -> str:
         words = covariate.joint
     elif covariate.joint:
         words = f"{words} of {covariate.joint}"
-    if covariate.aspect is Aspect.HISTORY:
-        return f"history of {words}"
-    return f"{words} and direction" if covariate.aspect is Aspect.DIRECTION else words
+    return f"history of {words}" if covariate.history else words
 
 
 def approximation_in_words(found: Approximation) -> str:

@@ -31,7 +31,7 @@ from excite_cli.identification.implausible_links import marked
 from excite_cli.identification.least_squares import LinearFit, fit_rows
 from excite_cli.identification.link_changes import LinkChange, inertial_covariance, link_changes
 from excite_cli.identification.prior import as_wide_as_needed, prior_of
-from excite_cli.identification.regression import Regression, follows_model, rebuilt
+from excite_cli.identification.regression import Regression, follows_model, places_of, rebuilt
 from excite_cli.robot.model import Array, Robot
 from excite_cli.shown.record import Shown
 
@@ -118,8 +118,7 @@ class Fit(Shown):
         return IdentifiedModel(self.consistent.phi, self.effects, self.consistent.effects)
 
     def _part(self, index: int) -> slice:
-        first = self.rank + sum(len(e.parameters) for e in self.effects[:index])
-        return slice(first, first + len(self.effects[index].parameters))
+        return places_of(self.effects, len(self.values))[index]
 
 
 def fit(

@@ -18,6 +18,7 @@ from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.regression import (
     Series,
     effect_columns,
+    places_of,
     signals_of,
     with_effects,
 )
@@ -44,10 +45,8 @@ class IdentifiedModel:
     @property
     def by_effect(self) -> Iterator[tuple[Effect, Array]]:
         """Every effect with its linear parameters."""
-        at = 0
-        for effect in self.effects:
-            yield effect, self.values[at : at + len(effect.parameters)]
-            at += len(effect.parameters)
+        places = places_of(self.effects, len(self.values))
+        return ((effect, self.values[at]) for effect, at in zip(self.effects, places, strict=True))
 
     def without(self, left: tuple[Effect, ...]) -> "IdentifiedModel":
         """The same without these effects."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,6 +114,17 @@ def with_effects(signals: Signals, effects: Sequence[Effect], values: Array) -> 
         signals = replace(signals, load=load, torque=load)
     rest = effect_columns(effects, signals) @ np.where(in_robot & ~carried, values, 0.0)
     return replace(signals, torque=load + rest)
+
+
+def width_of(effects: Sequence[Effect]) -> int:
+    """Number of linear parameters of effects."""
+    return sum(len(effect.parameters) for effect in effects)
+
+
+def places_of(effects: Sequence[Effect], count: int) -> list[slice]:
+    """Where the linear parameters of each effect are: together they are the last of `count`."""
+    edges = np.cumsum([count - width_of(effects), *(len(each.parameters) for each in effects)])
+    return [slice(start, end) for start, end in pairwise(edges.tolist())]
 
 
 def effect_columns(effects: Sequence[Effect], signals: Signals) -> Array:

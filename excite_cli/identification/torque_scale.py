@@ -28,6 +28,7 @@ from excite_cli.effects.catalogue import carried_body, scales
 from excite_cli.effects.rare_sizes import half_of
 from excite_cli.errors import ConfigError
 from excite_cli.identification.link_changes import SIX_AT, about_frame, slopes
+from excite_cli.identification.regression import places_of, width_of
 from excite_cli.measurement.dataset import Finding
 from excite_cli.measurement.torque_sources.catalogue import torque_source
 from excite_cli.robot.link_frame import link_frame, own_link
@@ -81,7 +82,7 @@ def weighed(
         The payload's link is unknown, or nothing moves it; no body has its inertia; the robot's
         whole mass does not show.
     """
-    width = base.rank + sum(len(effect.parameters) for effect in declared)
+    width = base.rank + width_of(declared)
     known = Knowledge(tuple(declared), np.zeros((0, width)), np.zeros(0))
     if spec.total_mass is not None:
         mass, std = spec.total_mass.mass, max(spec.total_mass.std, _LEAST * spec.total_mass.mass)
@@ -98,13 +99,11 @@ def _with(known: Knowledge, more: Sequence[Effect], mean: Array, covariance: Arr
     """And `more` effects, unless declared, whose parameters are N(mean, covariance)."""
     new = [effect for effect in more if effect not in known.effects]
     effects = (*known.effects, *new)
-    rows = np.pad(known.rows, ((0, 0), (0, sum(len(effect.parameters) for effect in new))))
-    widths = [len(effect.parameters) for effect in effects]
-    ends = rows.shape[1] - sum(widths) + np.cumsum([0, *widths])
-    at = [np.arange(*ends[i : i + 2]) for i in map(effects.index, more)]
+    rows = np.pad(known.rows, ((0, 0), (0, width_of(new))))
+    places = places_of(effects, rows.shape[1])
     whiten = np.linalg.inv(half_of(covariance))
     wide = np.zeros((len(mean), rows.shape[1]))
-    wide[:, np.concatenate(at)] = whiten
+    wide[:, np.r_[tuple(places[i] for i in map(effects.index, more))]] = whiten
     return Knowledge(
         effects, np.concatenate([rows, wide]), np.concatenate([known.target, whiten @ mean])
     )

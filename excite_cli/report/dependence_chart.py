@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from excite_cli.diagnosis.covariate import Aspect, Covariate
+from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.records import Diagnosis, ExcessResidual
 from excite_cli.diagnosis.traces import Traces
 from excite_cli.diagnosis.words import covariate_in_words
@@ -49,7 +49,7 @@ def _picture(
     plain = Covariate(covariate.quantity, "" if timed else names[k])
     axis = f"{covariate_in_words(plain)} [{of_x}]"
     groups = [("", known)]
-    if covariate.aspect is not Aspect.VALUE:
+    if covariate.history:
         groups = [("forwards", known & forward), ("backwards", known & ~forward)]
     means = [(label, *_means(x[at], left[at])) for label, at in groups if at.sum() >= 20]
     if not means:

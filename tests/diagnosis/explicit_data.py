@@ -16,7 +16,7 @@ from scipy.sparse import identity
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
-from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
+from excite_cli.diagnosis.possible_sizes import PossibleSizes
 from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.asymmetric_friction import AsymmetricFriction
@@ -281,7 +281,7 @@ def judge_of(
 ) -> Judgement:
     """Samples are independent and of unit noise; sizes are those that are possible."""
     plain = data.evidence(candidates, ONE)
-    sizes = PossibleSizes(candidates, spread_of(plain.covariance, 1.0), LARGE)
+    sizes = PossibleSizes(candidates, plain.covariance, LARGE)
     return Judgement(plain, plain, candidates, rules, sizes if allowed is None else allowed)
 
 

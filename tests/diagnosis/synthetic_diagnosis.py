@@ -10,7 +10,7 @@ from scipy.linalg import qr
 from excite_cli.config.load_spec import load_spec, spec_as_yaml
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.candidates import effect_of
-from excite_cli.diagnosis.covariate import Aspect, Covariate
+from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.records import (
     ConfoundedCandidate,
     Diagnosis,
@@ -175,7 +175,7 @@ def make_traces(
     covariates = (
         Covariate("position", "elbow"),
         Covariate("time"),
-        Covariate("position", aspect=Aspect.DIRECTION, own=True),
+        Covariate("position", history=True, own=True),
     )
     dependence = Dependence(tuple(joints), covariates, shares)
     units = ("N·m",) * n

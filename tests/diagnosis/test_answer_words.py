@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from excite_cli.diagnosis.answer_words import answer_in_words, shares
-from excite_cli.diagnosis.covariate import Aspect, Covariate
+from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.records import (
     Diagnosis,
     EffectRecord,
@@ -93,7 +93,7 @@ def test_one_effect_is_told_by_its_name_and_the_rest_by_what_it_depends_on() -> 
         "Load-dependent friction of elbow (2 N·m) accounts for nearly all of the error reduction. "
     )
     # What stays is told with what it depends on.
-    of = (Covariate("position", "elbow", Aspect.HISTORY), Covariate("time"))
+    of = (Covariate("position", "elbow", True), Covariate("time"))
     rest = replace(PLAIN.excess_residuals[0], depends_on=of)
     answer = found(effect("coulomb_friction", "elbow", RUBS, everywhere(0.4)),
                    left=(0.1, 0.1))  # fmt: skip

@@ -2,7 +2,7 @@
 
 import pytest
 
-from excite_cli.diagnosis.covariate import Aspect, Covariate
+from excite_cli.diagnosis.covariate import Covariate
 
 
 @pytest.mark.parametrize(
@@ -13,9 +13,8 @@ from excite_cli.diagnosis.covariate import Aspect, Covariate
         ("v[a b]", Covariate("speed", "a b")),
         ("a[time]", Covariate("acceleration", "time")),
         ("load[q[1]]", Covariate("load", "q[1]")),
-        ("history of q[elbow]", Covariate("position", "elbow", Aspect.HISTORY)),
-        ("direction and q[elbow]", Covariate("position", "elbow", Aspect.DIRECTION)),
-        ("own history of load", Covariate("load", "", Aspect.HISTORY, own=True)),
+        ("history of q[elbow]", Covariate("position", "elbow", True)),
+        ("own history of load", Covariate("load", "", True, own=True)),
         ("own load", Covariate("load", own=True)),
         ("column[temp [°C]]", Covariate("covariate", "temp [°C]")),
     ],
@@ -36,11 +35,11 @@ def test_another_text_is_none(code: str) -> None:
     [
         (Covariate("load", "elbow"), Covariate("load", own=True), "load"),
         (
-            Covariate("position", "elbow", Aspect.HISTORY),  # hysteresis is like friction
-            Covariate("position", "", Aspect.HISTORY, own=True),
+            Covariate("position", "elbow", True),  # hysteresis is like friction
+            Covariate("position", "", True, own=True),
             "speed",
         ),
-        (Covariate("covariate", "temp", Aspect.DIRECTION), None, None),
+        (Covariate("covariate", "temp"), None, None),
         (Covariate("position", "elbow"), None, "position"),
     ],
 )
@@ -49,4 +48,4 @@ def test_what_each_joint_has_of_its_own_loses_its_name(
 ) -> None:
     assert of.common == (common or of)
     assert like in (None, of.like)
-    assert Covariate("load", "elbow", Aspect.HISTORY).like == "load"
+    assert Covariate("load", "elbow", True).like == "load"

@@ -5,13 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.held_out_verdict import (
-    held_out_verdict,
-    removed_in_draws,
-    rises_on_one,
-)
+from excite_cli.diagnosis.held_out_verdict import held_out_verdict, removed_in_draws
 from excite_cli.diagnosis.verdict import HeldOutVerdict
-from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.identified_model import Prediction
 from excite_cli.identification.prepare import PreparedRun
 from tests.diagnosis.explicit_data import STEP, prepared
@@ -59,13 +54,3 @@ def test_draws_tell_what_is_removed_from_the_mean_relative_error() -> None:
         assert len(removed_in_draws([run], [worse], [better])) == 0
     run, worse, better = recording(1.0)
     assert len(removed_in_draws([run], [worse], [better])) > 0
-
-
-def test_an_effect_must_not_raise_the_error_of_one_of_its_joints() -> None:
-    def errors(a: float, b: float) -> Errors:
-        relative = {"a": a, "b": b}
-        return Errors(0.5 * (a + b), 0.5 * (a + b), relative, relative, relative, relative, (0, 1))
-
-    assert rises_on_one(["a", "b"], errors(0.1, 0.1), errors(0.01, 0.12))
-    assert not rises_on_one(["a"], errors(0.1, 0.1), errors(0.01, 0.12))
-    assert not rises_on_one(["a", "b"], errors(0.1, 0.1), errors(0.01, 0.105))

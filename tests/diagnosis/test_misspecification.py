@@ -66,7 +66,7 @@ def beside(kind: str, words: Sequence[str], energy: float, joints: tuple[int, ..
     [
         ("spring", ["q[a]"], (0,)),
         ("viscous_friction", ["v[a]"], (0,)),
-        ("coulomb_friction", ["direction and q[a]"], (0,)),
+        ("coulomb_friction", ["history of q[a]"], (0,)),
         ("stribeck_friction", ["history of q[a]"], (0,)),
         ("armature", ["a[a]"], (0,)),
         ("torque_gain", ["load[a]"], (0,)),

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.judgement import Judgement, Rules
-from excite_cli.diagnosis.possible_sizes import PossibleSizes, spread_of
+from excite_cli.diagnosis.possible_sizes import PossibleSizes
 from excite_cli.diagnosis.search import CandidateSearch
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Effect
@@ -72,7 +72,7 @@ def search(
     most: int = 80,
 ) -> set[int]:
     evidence = data.evidence(candidates, ONE)
-    sizes = PossibleSizes(candidates, spread_of(evidence.covariance, 1.0), LARGE)
+    sizes = PossibleSizes(candidates, evidence.covariance, LARGE)
     allowed = sizes if signs else anything
     found = CandidateSearch(Judgement(evidence, evidence, candidates, rules, allowed), most).run()
     assert len(found) == len(set(found))
@@ -222,7 +222,7 @@ def test_all_that_is_chosen_has_a_possible_sign_beside_all_others(seed: int) -> 
     data, candidates = random_case(LOCAL_AND_COHERENT, seed, 0.1)
     found = sorted(search(data, candidates, signs=True))
     evidence = data.evidence(candidates, ONE)
-    sizes = PossibleSizes(candidates, spread_of(evidence.covariance, 1.0), LARGE)
+    sizes = PossibleSizes(candidates, evidence.covariance, LARGE)
     assert sizes(evidence.solve(found), found, found)
 
 

@@ -87,7 +87,7 @@ def test_what_single_runs_carry_stays_beside_the_textbook_if_its_own_seconds_mis
         judge=judge,
         candidates=[SimpleNamespace(effect=each, rows=(0,), width=1) for each in effects],
     )
-    no_better = SimpleNamespace(better=False, of_error=0.0)
+    no_better = SimpleNamespace(better=False)
     models: Any = SimpleNamespace(
         difference=lambda one, other: no_better, missed=lambda chosen, rest, rows: missed
     )

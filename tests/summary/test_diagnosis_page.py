@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.covariate import Aspect, Covariate
+from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.records import (
     Approximation,
     ConfoundedCandidate,
@@ -56,9 +56,7 @@ def plain() -> Diagnosis:
 def diagnosis(plain: Diagnosis) -> Diagnosis:
     traces, held_out = make_traces(plain.joint_names)
     traces = replace(traces, runs=traces.runs[:1])
-    rest = replace(
-        plain.excess_residuals[0], depends_on=(Covariate("position", "elbow", Aspect.HISTORY),)
-    )
+    rest = replace(plain.excess_residuals[0], depends_on=(Covariate("position", "elbow", True),))
     return replace(plain, traces=traces, held_out_traces=held_out, excess_residuals=(rest,))
 
 
@@ -211,7 +209,7 @@ def test_what_depends_is_told_drawn_and_mapped(sections: dict[str, Section]) -> 
     assert "mean forwards" in drawn(picture)
     (table,) = (block for block in section.blocks if isinstance(block, Table))
     names = [row[0] for row in table.rows]
-    assert "own angle and direction" in names
+    assert "history of own angle" in names
     assert "time" not in names  # explains nothing
     assert "30" in table.rows[0]  # the most first
     page = render(Page("d", "", (), (section,)))
@@ -346,8 +344,8 @@ def test_joints_that_never_move_are_told_not_drawn(sections: dict[str, Section])
     [
         ("q[elbow]", "angle of elbow"),
         ("history of load[a b]", "history of rigid-body torque of a b"),
-        ("direction and q[elbow]", "angle of elbow and direction"),
-        ("own direction and q", "own angle and direction"),
+        ("history of q[elbow]", "history of angle of elbow"),
+        ("own history of q", "history of own angle"),
         ("own load", "own rigid-body torque"),
         ("time", "time"),
     ],
