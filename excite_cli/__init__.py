@@ -72,7 +72,7 @@ if TYPE_CHECKING:
     from excite_cli.excitation.inspection import Inspections as Inspections
     from excite_cli.excitation.motion import Motion as Motion
     from excite_cli.excitation.problem import Problem as Problem
-    from excite_cli.excitation.random_comparison import Comparison as Comparison
+    from excite_cli.excitation.result import Comparison as Comparison
     from excite_cli.excitation.result import Result as Result
     from excite_cli.identification.carried_load import LoadIdentification as LoadIdentification
     from excite_cli.identification.fit import Fit as Fit

@@ -5,8 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
-from excite_cli.api.least_time import duration_is_free
 from excite_cli.api.motions import Motions, load_motions
+from excite_cli.api.planning import duration_is_free
 from excite_cli.config.load_spec import parse_spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.admissible import path_of

@@ -11,8 +11,8 @@ from excite_cli.config.load_spec import parse_spec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.catalogue import build_constraints
 from excite_cli.errors import ExciteError, FileError
+from excite_cli.excitation.inspection import not_in_config
 from excite_cli.excitation.motion import Doubt
-from excite_cli.excitation.not_modelled import not_in_config
 from excite_cli.excitation.problem import build_problem
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.time_scaling import PaceLimits, slowed_chain

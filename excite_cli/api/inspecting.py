@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from excite_cli.api.arguments import checked
+from excite_cli.api.arguments import checked, page_path
 from excite_cli.api.loading import (
     Case,
     as_recorded,
@@ -17,7 +17,6 @@ from excite_cli.api.loading import (
     with_drive_law,
 )
 from excite_cli.api.outputs import held
-from excite_cli.api.paths import page_path
 from excite_cli.atomic import write_atomically, write_text_atomically
 from excite_cli.checks import rows
 from excite_cli.checks.all_checks import look
@@ -28,7 +27,7 @@ from excite_cli.config.commented_yaml import amended, changed_values, with_value
 from excite_cli.config.constraints_spec import ConstraintsSpec
 from excite_cli.config.load_spec import load_spec, spec_of
 from excite_cli.config.plain_yaml import yaml_text
-from excite_cli.config.task_spec import TaskSpec
+from excite_cli.config.trajectory_spec import TaskSpec
 from excite_cli.diagnosis.measured_prior import measured_stack
 from excite_cli.diagnosis.power import EffectPower, sizes_shown
 from excite_cli.errors import ExciteError

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from excite_cli.api.arguments import checked
+from excite_cli.api.arguments import checked, paths_in, refuse_twice
 from excite_cli.api.foreign_motions import is_motion, measured_motions, read_segment
-from excite_cli.api.paths import paths_in, refuse_twice
 from excite_cli.base_link.wrench_rows import with_base
 from excite_cli.checks.bodies import bodies_in_words
 from excite_cli.config.load_spec import files_of_config, load_spec, parse_spec, spec_of

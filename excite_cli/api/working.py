@@ -12,6 +12,7 @@ from excite_cli.workers.catalogue import open_workers
 
 def single_threaded(threads: int = 1) -> AbstractContextManager[object]:
     """Limit the linear algebra library: its matrices here are too small for many threads."""
+    import scipy.linalg  # noqa: F401  (only libraries that are loaded by then are limited)
     from threadpoolctl import threadpool_limits
 
     return threadpool_limits(limits=threads)

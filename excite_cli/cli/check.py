@@ -37,10 +37,10 @@ def check(
       excite check ur10.yaml ur10.h5
       excite check ur10.yaml ur10.h5 --random 10000 --json
     """
+    from excite_cli.api.arguments import existing
     from excite_cli.api.checking import check as check_motions
     from excite_cli.api.checking import check_answer
     from excite_cli.api.loading import load_problem
-    from excite_cli.api.paths import existing
 
     existing(file)
     problem = load_problem(config, overrides or (), terminal.tell)

@@ -142,20 +142,14 @@ _MESSAGES = {
 }
 
 
-def command(run: Callable[..., None]) -> Callable[..., None]:
-    """A command with the options of its messages, in place of the first parameter, a `Terminal`.
-
-    It runs with as many threads of the linear algebra library as `threads` says, else one.
-    """
+def with_messages(run: Callable[..., None]) -> Callable[..., None]:
+    """A command with the options of its messages in place of its first parameter, a `Terminal`."""
 
     @functools.wraps(run)
-    def guarded(
+    def talking(
         *, as_json: bool, quiet: bool, verbose: bool, no_progress: bool, **given: Any
     ) -> None:
-        from excite_cli.api.working import single_threaded
-
-        with single_threaded(given.get("threads", 1)):
-            run(Terminal(as_json, quiet, verbose, not no_progress), **given)
+        run(Terminal(as_json, quiet, verbose, not no_progress), **given)
 
     _, *own = inspect.signature(run).parameters.values()
     shared = [
@@ -167,6 +161,19 @@ def command(run: Callable[..., None]) -> Callable[..., None]:
         )
         for name, (names, words) in _MESSAGES.items()
     ]
-    guarded.__signature__ = inspect.Signature([*own, *shared])  # type: ignore[attr-defined]
-    guarded.__annotations__ = {each.name: each.annotation for each in [*own, *shared]}
-    return guarded
+    talking.__signature__ = inspect.Signature([*own, *shared])  # type: ignore[attr-defined]
+    talking.__annotations__ = {each.name: each.annotation for each in [*own, *shared]}
+    return talking
+
+
+def command(run: Callable[..., None]) -> Callable[..., None]:
+    """A command `with_messages` that calculates: in as many threads as `threads` says, else one."""
+
+    @functools.wraps(run)
+    def limited(terminal: Terminal, **given: Any) -> None:
+        from excite_cli.api.working import single_threaded
+
+        with single_threaded(given.get("threads", 1)):
+            run(terminal, **given)
+
+    return with_messages(limited)

@@ -7,7 +7,7 @@ from excite_cli.cli.completion import complete_robot
 from excite_cli.cli.console import Terminal
 
 
-@options.command
+@options.with_messages
 def robots(
     terminal: Terminal,
     robot: str | None = typer.Argument(

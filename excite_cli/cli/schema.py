@@ -6,7 +6,7 @@ from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
 
 
-@options.command
+@options.with_messages
 def schema(
     terminal: Terminal,
     output: Path | None = options.written("--output", "-o", help="Write it to this file."),

@@ -14,11 +14,11 @@ from excite_cli.cli.completion import complete_effect
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
 from excite_cli.cli.options import start_from
-from excite_cli.config.spec import Spec
 from excite_cli.errors import ConfigError
 
 if TYPE_CHECKING:
     from excite_cli.api.simulating import PositionDrive
+    from excite_cli.config.spec import Spec
 
 _played = partial(typer.Option, rich_help_panel="Playback")
 _of_robot = partial(typer.Option, rich_help_panel="Simulated robot")
@@ -258,7 +258,7 @@ def _drive(
     )
 
 
-def _base_noise(spec: Spec, wrench: str | None, imu: str | None) -> dict[str, float]:
+def _base_noise(spec: "Spec", wrench: str | None, imu: str | None) -> dict[str, float]:
     """Standard deviations by their names in the settings; none of options that are not given.
 
     Raises

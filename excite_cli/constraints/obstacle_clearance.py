@@ -16,9 +16,8 @@ from excite_cli.geometry.obstacle_distances import ObstacleDistances
 from excite_cli.geometry.obstacle_pairs import ObstaclePairs, choose_obstacle_pairs
 from excite_cli.geometry.obstacles import Box, Obstacle, build_obstacles
 from excite_cli.geometry.reasons import DroppedPair, Why, counted_reasons, reason_in_words
-from excite_cli.proof.enclosed_distances import EnclosedCapsules
+from excite_cli.proof.enclosed_distances import EnclosedCapsules, least_clearances
 from excite_cli.proof.enclosed_motion import EnclosedMotion
-from excite_cli.proof.enclosed_obstacles import least_clearances
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
 from excite_cli.shown.note import Level, Note

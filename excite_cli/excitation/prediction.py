@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, cho_factor, cho_solve
 
 from excite_cli.config.spec import Spec
-from excite_cli.config.task_spec import TaskSpec
+from excite_cli.config.trajectory_spec import TaskSpec
 from excite_cli.criteria.base import condition_number, singular_values
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.inertial_prior import UNSURE, inertial_prior

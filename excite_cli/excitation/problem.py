@@ -334,3 +334,37 @@ def with_cost_on(problem: Problem, fine: Basis) -> Problem:
         row_name=weighting.row_name if weighting.row_name != "none" else "even",
     )
     return replace(problem, cost_basis=fine, weighting=weighted)
+
+
+def predicting(
+    problem: Problem, kinds: Sequence[str] = (), possible: Sequence[Effect] | None = None
+) -> Problem:
+    """The problem with its prediction, in which these kinds of effects are possible, too.
+
+    Made for another criterion, or without one of them, it gets a prediction beside that, with the
+    effects `possible` in place of the usual ones.
+    """
+    there = {effect.kind for effect in problem.extension.effects}
+    if problem.prediction is not None and there.issuperset(kinds):
+        return problem
+    made = build_prediction(
+        problem.spec,
+        problem.robot,
+        problem.base,
+        [] if problem.prediction is not None else problem.extension.effects,
+        acceleration_bounds(problem.spec, problem.robot),
+        problem.trajectory.duration,
+        len(problem.cost_basis.times),
+        problem.work,
+        kinds,
+        possible,
+    )
+    wide = replace(
+        problem,
+        weighting=made.weighting,
+        extension=made.extension,
+        prediction=made,
+        separation=None,
+        metric=None,
+    )
+    return on_fine_grid(wide) if made.extension.fine else wide

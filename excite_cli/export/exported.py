@@ -44,3 +44,16 @@ def number(value: float) -> str:
 def vector(values: Array) -> str:
     """Numbers with spaces between them."""
     return " ".join(number(value) for value in values)
+
+
+MODEL_FORMATS = {
+    "urdf": ".urdf",
+    "mjcf": ".xml",
+    "yaml": ".yaml",
+    "c": ".c",
+    "randomization": "_randomization.json",
+    "isaaclab": "_isaaclab.py",
+    "mjlab": "_mjlab.py",
+    "bam": "_bam.json",
+}
+OF_DRIVES = ("isaaclab", "mjlab", "bam")  # of robots that follow set points only

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.geometry.hull_bounds import ball_bounds, hull_bounds
+from excite_cli.geometry.hull_bounds import RelativeReach, ball_bounds, hull_bounds
 from excite_cli.geometry.link_meshes import LinkMesh, Poses, link_meshes
 from excite_cli.geometry.mesh_pairs import (
     MeshPair,
@@ -21,7 +21,6 @@ from excite_cli.geometry.mesh_pairs import (
     movable_pairs,
 )
 from excite_cli.geometry.reasons import ContactMeaning
-from excite_cli.geometry.relative_reach import RelativeReach
 from excite_cli.robot.model import Robot
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.excitation.problem import with_shapes
 from excite_cli.proposal.assumed_limits import MOST_ACCELERATION, JointPlan, plan_limits
-from excite_cli.proposal.cell import Cell, put_cell
+from excite_cli.proposal.cell import Cell, Floor, floor_below, put_cell
 from excite_cli.proposal.disabled_pairs import chosen_srdf, disabled_pairs
 from excite_cli.proposal.feasibility import (
     Comments,
@@ -23,10 +23,8 @@ from excite_cli.proposal.feasibility import (
     first_posture,
     settle,
 )
-from excite_cli.proposal.floor import Floor, floor_below
 from excite_cli.proposal.joints import JointChoice, choose_joints
-from excite_cli.proposal.shapes import Shapes, choose_shapes
-from excite_cli.proposal.timing import Pace, choose_pace
+from excite_cli.proposal.shapes import Pace, Shapes, choose_pace, choose_shapes
 from excite_cli.robot.assumed_inertias import with_assumed_inertias
 from excite_cli.robot.description import RobotDescription
 from excite_cli.robot.model import build_robot

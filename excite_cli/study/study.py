@@ -15,8 +15,7 @@ from excite_cli.study.records import (
     kept_case,
     write_table,
 )
-from excite_cli.workers.base import News, Tell, Workers
-from excite_cli.workers.here import Here
+from excite_cli.workers.base import Here, News, Tell, Workers
 
 # Figures of which the lowest is the best, the first that a case has.
 BEST = ("condition_number", "after", "identified_error")

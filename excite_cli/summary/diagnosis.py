@@ -19,8 +19,7 @@ from excite_cli.diagnosis.words import (
     rests_in_words,
     value_in_words,
 )
-from excite_cli.report.dependence_chart import dependence_plots
-from excite_cli.report.residual_chart import residuals_in_time
+from excite_cli.report.residual_chart import dependence_plots, residuals_in_time
 from excite_cli.shown.answer import (
     Answer,
     Block,

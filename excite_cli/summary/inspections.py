@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from excite_cli.excitation.inspection import Inspection, Inspections
-from excite_cli.excitation.not_modelled import not_modelled
+from excite_cli.excitation.inspection import Inspection, Inspections, not_modelled
 from excite_cli.excitation.problem import Problem
 from excite_cli.fields import data_of
 from excite_cli.geometry.reasons import standing_in_words

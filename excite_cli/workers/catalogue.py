@@ -3,8 +3,7 @@
 from collections.abc import Callable
 
 from excite_cli.errors import ConfigError
-from excite_cli.workers.base import Workers
-from excite_cli.workers.here import Here
+from excite_cli.workers.base import Here, Workers
 
 MOST_WORKERS = 256
 

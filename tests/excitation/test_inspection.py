@@ -15,8 +15,7 @@ from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.excitation.admissible import Path as MotionPath
 from excite_cli.excitation.admissible import path_of, verdicts
-from excite_cli.excitation.inspection import Inspection, Look, inspect, mesh_check_of
-from excite_cli.excitation.mesh_verdict import mesh_verdict
+from excite_cli.excitation.inspection import Inspection, Look, inspect, mesh_check_of, mesh_verdict
 from excite_cli.excitation.nearest import closest_time, nearest_bodies
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.geometry.coal_distances import CoalDistances

@@ -9,7 +9,7 @@ import pytest
 
 from excite_cli.errors import FileError
 from excite_cli.scoring.thresholds import Thresholds
-from excite_cli.store.thresholds_file import read_thresholds, write_thresholds
+from excite_cli.store.score_file import read_thresholds, write_thresholds
 
 GIVEN = Thresholds(("a", "b"), np.arange(1.0, 9.0).reshape(2, 4), np.array([3.0, 4.0]), 0.5, 0.02)
 

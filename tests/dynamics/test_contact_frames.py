@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 from excite_cli.config.robot_spec import RobotSpec
-from excite_cli.dynamics.inertial_unit import readings
+from excite_cli.dynamics.contact_frames import readings
 from excite_cli.robot.model import build_robot
 
 

@@ -4,9 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli.api.least_time import as_planned, of_duration
 from excite_cli.api.motions import load_motions
-from excite_cli.api.planning import plan, plan_answer
+from excite_cli.api.planning import as_planned, of_duration, plan, plan_answer
 from excite_cli.diagnosis.goals import Goals
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
