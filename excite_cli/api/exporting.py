@@ -5,9 +5,14 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from excite_cli.api.approach import Start, durations_of
 from excite_cli.api.arguments import checked, existing, paths_in
-from excite_cli.api.exported_chains import ChainRequest, ExportedChain, chains_of
+from excite_cli.api.exported_chains import (
+    ChainRequest,
+    ExportedChain,
+    Start,
+    chains_of,
+    durations_of,
+)
 from excite_cli.api.model_exports import ModelRequest, write_requested
 from excite_cli.api.outputs import held
 from excite_cli.claim import claim, leave

@@ -18,8 +18,13 @@ from excite_cli.api.loading import (
 )
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_atomically, write_text_atomically
-from excite_cli.checks import rows
-from excite_cli.checks.all_checks import look
+from excite_cli.checks.all_checks import (
+    look,
+    row_names,
+    rows_in_order,
+    rows_of_description,
+    rows_of_files,
+)
 from excite_cli.checks.check_result import CheckResult
 from excite_cli.checks.sentences import BELONG, written
 from excite_cli.checks.trust import but_trusted, check_names
@@ -103,8 +108,8 @@ def inspect(
     files = [data] if isinstance(data, str | Path) else list(data)
     page = None if output is None else page_path(output)
     with held({"apply": apply, "output": page}, overwrite, inputs_of(problem, *files)):
-        check_names(case.spec, rows.names())
-        found = but_trusted(rows.of_description(case.robot, case.spec), case.spec)
+        check_names(case.spec, row_names())
+        found = but_trusted(rows_of_description(case.robot, case.spec), case.spec)
         settings: dict[str, Any] = {}
         before, more = settings, settings
         runs: tuple[str, ...] = ()
@@ -129,7 +134,7 @@ def inspect(
             if is_all or not more:  # what the dynamics say was tried by them
                 break
             case = _changed(case, more)
-        inspection = LogInspection(rows.in_order(found, bool(files), case.spec), settings, runs)
+        inspection = LogInspection(rows_in_order(found, bool(files), case.spec), settings, runs)
         if power:
             law = with_drive_law(case, load_data(case, files, tell), None, tell)
             shown = power_of_data(case, law[1])
@@ -178,7 +183,7 @@ def _looked(
     Of a unit or a clock that is not `settled` yet they would say what is wrong.
     """
     told = [e for e in recorded.findings if e.severity != "note" or e.kind == "wrapped"]
-    found = rows.of_files(merged(told), case.spec)
+    found = rows_of_files(merged(told), case.spec)
     if any(each.status == "fault" or {*each.settings} - {*settled} for each in found):
         return found, False
     settled_case, data, _ = with_drive_law(case, completed(case, recorded), None, tell)

@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager
 
 from excite_cli.shown.note import Level, Note, Tell, saying
 from excite_cli.workers.base import Workers
-from excite_cli.workers.catalogue import open_workers
+from excite_cli.workers.context import open_workers
 
 # How many threads the linear algebra library takes.
 

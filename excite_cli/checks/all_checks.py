@@ -7,13 +7,12 @@ from the start. What no mistake explains is left to the diagnosis.
 from collections.abc import Sequence
 from dataclasses import replace
 
-from excite_cli.checks import foreign_runs, rows, sentences, standing_legs
+from excite_cli.checks import foreign_runs, sentences, standing_legs
 from excite_cli.checks.base import Log
-from excite_cli.checks.catalogue import log_checks, setup_checks
-from excite_cli.checks.check_result import CheckResult
-from excite_cli.checks.samples import samples_of
+from excite_cli.checks.catalogue import description_checks, log_checks, setup_checks
+from excite_cli.checks.check_result import CheckResult, Status
 from excite_cli.checks.set_up_search import mistakes
-from excite_cli.checks.setup import Setup
+from excite_cli.checks.setup import Setup, samples_of
 from excite_cli.checks.textbook_fit import TextbookFit
 from excite_cli.checks.trust import but_trusted, is_trusted
 from excite_cli.config.spec import Spec
@@ -97,7 +96,7 @@ def findings_of(
     if spec.measurement.filter.position == "auto":
         motion = check_motion(runs, processing, robot.joint_names)
     doubts = [each.finding for each in found if each.status != "ok"]
-    is_open = any(each.is_open for each in (*found, *rows.of_files(seen, spec)))
+    is_open = any(each.is_open for each in (*found, *rows_of_files(seen, spec)))
     return (*motion, *doubts), is_open and spec.measurement.trust is not True
 
 
@@ -129,3 +128,75 @@ def check_dataset(
     runs = split(dataset, held_out, spec.diagnosis.block, needed).training
     processing = choose_processing(runs, spec.measurement.filter, spec.diagnosis.moving_speed)
     return findings_of(robot, runs, prepare_all(runs, processing), processing, spec)[0]
+
+
+# The rows of `excite inspect`: everything that is looked at, in order, and what came of it.
+
+# What is seen while files are read, by the kind of finding.
+_OF_FILES: dict[str, tuple[str, ...]] = {
+    "time stamps and gaps": (
+        "stamps", "gap", "jitter", "order", "truncated", "ragged", "uneven_periods", "interpolated",
+        "slow_rate",
+    ),
+    "missing or frozen values": (
+        "nan", "nan_torque", "nan_speed", "nan_position", "stuck", "stale", "held", "dead",
+        "dead_torque", "mostly_constant", "saturated", "no_speed", "torque_steps",
+    ),
+    "names of columns": ("numbered", "words", "other_joints", "swapped", "sign"),
+    "wrapped angles": ("wrapped",),
+    "units of positions and time": ("units", "gain", "lag"),
+    "limits of the joints": ("outside_limits", "torque_units"),
+}  # fmt: skip
+_OTHER = "what else was noticed"
+_TRUSTED = "not judged: measurement.trust names it"
+_SPEEDS = "measurement.channels"  # leaves recorded speeds out, which no fit needs
+_STATUS: dict[str, Status] = {"error": "fault", "warning": "doubt", "note": "ok"}
+
+
+def rows_of_description(robot: Robot, spec: Spec) -> list[CheckResult]:
+    """Doubts and faults of the description alone."""
+    log = Log(robot, (), (), spec)
+    return [each for check in description_checks() for each in check.look(log)]
+
+
+def rows_of_files(findings: Sequence[Finding], spec: Spec) -> list[CheckResult]:
+    """Results of what was seen while files were read; doubts of trusted checks are none.
+
+    A doubt that asks for another config is open. A fault has a key of its own.
+    """
+    row = {kind: name for name, kinds in _OF_FILES.items() for kind in kinds}
+    row |= {check.kind: check.name for check in setup_checks()}
+    found = [
+        CheckResult(
+            row.get(each.kind, _OTHER), each.kind, _STATUS[each.severity], each.text, each.joints,
+            each.run, each.settings,
+            is_open=each.severity == "warning" and bool({*each.settings} - {_SPEEDS}),
+        )
+        for each in findings
+    ]  # fmt: skip
+    faults = [each for each in found if each.status == "fault"]
+    return [*faults, *but_trusted((each for each in found if each.status != "fault"), spec)]
+
+
+def row_names() -> tuple[str, ...]:
+    """Of all checks, those of packages among them."""
+    groups = (description_checks(), setup_checks(), log_checks())
+    first, sought, others = ([check.name for check in group] for group in groups)
+    stages = (*_OF_FILES, foreign_runs.NAME, standing_legs.NAME)
+    return tuple(dict.fromkeys((*first, *stages, *sought, sentences.BELONG, *others)))
+
+
+def rows_in_order(
+    found: Sequence[CheckResult], judged: bool, spec: Spec
+) -> tuple[CheckResult, ...]:
+    """Results by the order of rows; a row without any is fine, if it was `judged` or trusted."""
+    rows: list[CheckResult] = []
+    described = {check.name for check in description_checks()}
+    seen = {*described, *_OF_FILES}  # trusted or not
+    for name in (*row_names(), _OTHER):
+        own = [each for each in found if each.name == name]
+        if not own and (judged or name in described) and name != _OTHER:
+            is_judged = name in seen or not is_trusted(name, spec)
+            own = [CheckResult(name, "", "ok", "" if is_judged else _TRUSTED)]
+        rows += own
+    return tuple(rows)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from excite_cli.checks.check_result import CheckResult
-from excite_cli.checks.samples import Samples
+from excite_cli.checks.setup import Samples
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.robot.link_frame import leaves, own_link

@@ -10,8 +10,8 @@ from excite_cli.constraints.drawing import ConstraintScene, NearestBodies
 from excite_cli.constraints.nearest_bodies import nearest_obstacles
 from excite_cli.constraints.setting import Setting
 from excite_cli.dynamics.forward_kinematics import States
-from excite_cli.geometry.coal_distances import CoalDistances
 from excite_cli.geometry.link_meshes import Poses
+from excite_cli.geometry.mesh_distances import CoalDistances
 from excite_cli.geometry.obstacle_distances import ObstacleDistances
 from excite_cli.geometry.obstacle_pairs import ObstaclePairs, choose_obstacle_pairs
 from excite_cli.geometry.obstacles import Box, Obstacle, build_obstacles

@@ -13,8 +13,7 @@ from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.dynamics.regressor import Regressor, standard_parameter_names
 from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint, body_regressors, cross
 from excite_cli.errors import ConfigError
-from excite_cli.robot.carried_bodies import carried_bodies
-from excite_cli.robot.link_frame import carrying_frame
+from excite_cli.robot.link_frame import carried_bodies, carrying_frame
 from excite_cli.robot.model import Array, Robot, links_by_joint
 
 # The ten parameters of what a link carries, as the columns of a motion that is to show them.

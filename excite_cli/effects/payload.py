@@ -13,8 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from excite_cli.dynamics.nearest_inertias import nearest_inertias
-from excite_cli.dynamics.pseudo_inertia import moved, smallest_eigenvalues
+from excite_cli.dynamics.pseudo_inertia import moved, nearest_inertias, smallest_eigenvalues
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
 from excite_cli.effects.base import (
     Cotangents,

@@ -23,7 +23,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.mesh_check import MeshCheck, MeshGap, MeshGaps
 from excite_cli.geometry.reasons import ContactMeaning
 from excite_cli.proof.certificate import Path, ProofVerdict, State, Worst, certify
-from excite_cli.proof.enclosed_trajectory import Intervals, enclosed_states, intervals_of
+from excite_cli.proof.enclosed_motion import Intervals, enclosed_states, intervals_of
 from excite_cli.robot.model import links_by_joint
 from excite_cli.shown.record import Shown
 

@@ -14,10 +14,9 @@ import numpy as np
 from scipy.linalg import lapack, qr
 
 from excite_cli.criteria.base import Criterion, condition_number, singular_values
-from excite_cli.dynamics.adjoint import FictitiousInertiaAdjoint
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import Regressor
-from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint
+from excite_cli.dynamics.spatial_adjoint import FictitiousInertiaAdjoint, SpatialAdjoint
 from excite_cli.excitation.effect_columns import SeenColumns
 from excite_cli.excitation.extension import Extension
 from excite_cli.excitation.progress import Figure, ProgressMeasure

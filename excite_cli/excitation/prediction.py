@@ -41,9 +41,8 @@ from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION, catalogue,
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.excitation.extension import Extension, extend, why_not_planned
 from excite_cli.excitation.objective import Objective, Spectrum
-from excite_cli.excitation.reference_states import state_bounds
 from excite_cli.excitation.stack import Stack
-from excite_cli.excitation.weighting import Weighting
+from excite_cli.excitation.weighting import Weighting, state_bounds
 from excite_cli.robot.model import Array, Robot
 
 # Share of a joint's usual torque that an effect may well have: of what every robot has, and of the

@@ -30,15 +30,18 @@ from excite_cli.excitation.discrimination import Discrimination, Separation
 from excite_cli.excitation.extension import Extension, extend
 from excite_cli.excitation.objective import Objective
 from excite_cli.excitation.prediction import PredictedTorques, Prediction, build_prediction
-from excite_cli.excitation.reference_states import reference_rows, torque_metric
 from excite_cli.excitation.stack import Stack
-from excite_cli.excitation.weighting import Weighting, build_weighting
+from excite_cli.excitation.weighting import (
+    Weighting,
+    build_weighting,
+    reference_rows,
+    torque_metric,
+)
 from excite_cli.robot.mesh_paths import without_unusable
 from excite_cli.robot.model import Robot, build_robot
 from excite_cli.shown.record import Shown
-from excite_cli.trajectory.base import Basis, Trajectory
+from excite_cli.trajectory.base import Basis, Trajectory, with_freedom
 from excite_cli.trajectory.catalogue import build_trajectory
-from excite_cli.trajectory.freedom import with_freedom
 
 # Instants of the cost and of the constraints, filled in from the trajectory where not given.
 

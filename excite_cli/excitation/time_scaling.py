@@ -19,7 +19,7 @@ import numpy as np
 from excite_cli.constraints.base import Array, Constraint
 from excite_cli.constraints.joint_columns import Quantity
 from excite_cli.errors import ConfigError
-from excite_cli.proof.enclosed_trajectory import Intervals, enclosed_states, intervals_of
+from excite_cli.proof.enclosed_motion import Intervals, enclosed_states, intervals_of
 from excite_cli.trajectory.base import Trajectory
 from excite_cli.trajectory.fade import Chain
 

@@ -13,11 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.geometry.hull_bounds import RelativeReach, ball_bounds, hull_bounds
 from excite_cli.geometry.link_meshes import LinkMesh, Poses, link_meshes
 from excite_cli.geometry.mesh_pairs import (
     MeshPair,
     PairMeshes,
+    RelativeReach,
+    ball_bounds,
+    hull_bounds,
     movable_pairs,
 )
 from excite_cli.geometry.reasons import ContactMeaning

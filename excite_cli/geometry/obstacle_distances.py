@@ -14,7 +14,7 @@ from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.geometry.obstacles import Box, Obstacle
 from excite_cli.geometry.world_segments import CapsuleAxes, WorldSegments
 from excite_cli.robot.capsule import Capsule
-from excite_cli.robot.carried_bodies import carried_bodies
+from excite_cli.robot.link_frame import carried_bodies
 from excite_cli.robot.model import Robot
 
 Array = NDArray[np.float64]

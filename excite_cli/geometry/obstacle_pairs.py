@@ -21,7 +21,7 @@ from excite_cli.geometry.obstacle_distances import ObstacleDistances
 from excite_cli.geometry.obstacles import FLOOR, Obstacle
 from excite_cli.geometry.reasons import DroppedPair, Reason, Why, reason_in_words
 from excite_cli.robot.capsule import Capsule
-from excite_cli.robot.carried_bodies import MovedBodies
+from excite_cli.robot.link_frame import MovedBodies
 from excite_cli.robot.model import Array, Robot
 
 _SAMPLES, _SEED = 300, 0

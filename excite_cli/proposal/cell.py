@@ -9,7 +9,7 @@ import numpy as np
 from excite_cli.config.load_spec import parsed_spec
 from excite_cli.errors import ConfigError
 from excite_cli.geometry.link_meshes import Poses, link_meshes
-from excite_cli.robot.carried_bodies import MovedBodies
+from excite_cli.robot.link_frame import MovedBodies
 from excite_cli.robot.model import Array, Robot
 
 Tree = dict[str, Any]

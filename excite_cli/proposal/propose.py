@@ -14,7 +14,6 @@ from excite_cli.errors import ConfigError, RobotError
 from excite_cli.excitation.problem import with_shapes
 from excite_cli.proposal.assumed_limits import MOST_ACCELERATION, JointPlan, plan_limits
 from excite_cli.proposal.cell import Cell, Floor, floor_below, put_cell
-from excite_cli.proposal.disabled_pairs import chosen_srdf, disabled_pairs
 from excite_cli.proposal.feasibility import (
     Comments,
     FeasibleProblem,
@@ -24,7 +23,14 @@ from excite_cli.proposal.feasibility import (
     settle,
 )
 from excite_cli.proposal.joints import JointChoice, choose_joints
-from excite_cli.proposal.shapes import Pace, Shapes, choose_pace, choose_shapes
+from excite_cli.proposal.shapes import (
+    Pace,
+    Shapes,
+    choose_pace,
+    choose_shapes,
+    chosen_srdf,
+    disabled_pairs,
+)
 from excite_cli.robot.assumed_inertias import with_assumed_inertias
 from excite_cli.robot.description import RobotDescription
 from excite_cli.robot.model import build_robot

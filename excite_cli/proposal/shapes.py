@@ -1,6 +1,7 @@
 """Which shapes stand for the links of a robot, and which links nothing can stand for."""
 
 import math
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,8 +10,9 @@ import numpy as np
 from excite_cli.proposal.assumed_limits import JointPlan
 from excite_cli.robot.description import RobotDescription
 from excite_cli.robot.mesh_paths import Unusable, unusable, without_unusable
+from excite_cli.robot.srdf import NEVER, Srdf
 from excite_cli.robot.urdf_joints import UrdfSurvey, survey
-from excite_cli.trajectory.freedom import harmonics_for
+from excite_cli.trajectory.base import harmonics_for
 
 
 @dataclass(frozen=True)
@@ -105,3 +107,110 @@ def choose_pace(joints: Sequence[JointPlan]) -> Pace:
     usual = needed[slowest] <= _SHORTEST
     harmonics = harmonics_for(duration, np.array([joint.acceleration for joint in joints]))
     return Pace(duration, harmonics, _INSTANTS, None if usual else joints[slowest].name)
+
+
+# Pairs of links whose contact the robot's author ruled out: of an SRDF, or of MJCF's <exclude>.
+
+
+@dataclass(frozen=True)
+class DisabledPairs:
+    """Pairs that are not kept apart, where they come from (""), and what else there is to say."""
+
+    pairs: tuple[tuple[str, str], ...] = ()
+    source: str = ""
+    notes: tuple[str, ...] = ()
+
+    @property
+    def in_words(self) -> str:
+        """For the comment beside the pairs."""
+        many = f"{len(self.pairs)} pairs of links" if len(self.pairs) > 1 else "1 pair of links"
+        return f"NOT GUARDED: {many} as {self.source}"
+
+
+def disabled_pairs(
+    description: RobotDescription, srdf: Srdf | None, moved: Sequence[str], visual: bool = False
+) -> DisabledPairs:
+    """Pairs that would be kept apart were they not disabled, with `moved` joints that move.
+
+    visual: visual shapes count where a link has none for collisions.
+
+    Those that an SRDF disables since they were never seen to touch are kept apart all the same: its
+    word rests on random postures, and keeping apart what never meets costs nothing.
+    """
+    given = [(one, other, "") for one, other in description.ignored]
+    source = f"{description.path.name} excludes them" if given else ""
+    if srdf is not None and srdf.disabled:
+        beside = f"{source}, and " if given else ""
+        given += srdf.disabled
+        source = f"{beside}{srdf.path.name} disables them"
+    bodies = _Bodies(description, moved, visual)
+    wanted, never, unknown = [], set(), set()
+    for one, other, reason in given:
+        unknown |= {name for name in (one, other) if name not in bodies.of}
+        if unknown & {one, other} or not bodies.may_meet(one, other):
+            continue
+        if reason.lower() == NEVER:
+            never.add(frozenset((one, other)))
+        else:
+            wanted.append((min(one, other), max(one, other)))
+    pairs = tuple(dict.fromkeys(wanted))
+    notes = []
+    if never:
+        notes.append(
+            f"{len(never)} pairs that {srdf.path.name if srdf else ''} disables as never in "
+            "contact are checked all the same"
+        )
+    if unknown:
+        names = ", ".join(sorted(unknown)[:6])
+        notes.append(f"links of {srdf.path.name if srdf else ''} that are not here: {names}")
+    return DisabledPairs(pairs, source if pairs else "", tuple(notes))
+
+
+def chosen_srdf(near: Sequence[Srdf], description: RobotDescription) -> Srdf | None:
+    """That of this robot: called like the URDF, or the only one for a robot of its name."""
+    root = ElementTree.fromstring(description.xml)
+    stem = description.path.stem.split(".")[0]
+    alike = [each for each in near if each.path.stem.split(".")[0] == stem]
+    named = [each for each in near if each.robot == root.get("name")]
+    return alike[0] if alike else named[0] if len(named) == 1 else None
+
+
+class _Bodies:
+    """Links by the body that they are part of while only some joints move, and their shapes."""
+
+    def __init__(self, description: RobotDescription, moved: Sequence[str], visual: bool) -> None:
+        root = ElementTree.fromstring(description.xml)
+        kinds = ("collision", "visual") if visual else ("collision",)
+        self._solid = {
+            link.get("name", "")
+            for link in root.findall("link")
+            if any(link.find(f"{kind}/geometry") is not None for kind in kinds)
+        }
+        joints = [
+            (_link(joint, "parent"), _link(joint, "child"), joint.get("name") in moved)
+            for joint in root.findall("joint")
+        ]
+        children: dict[str, list[tuple[str, bool]]] = {}
+        for parent, child, moves in joints:
+            children.setdefault(parent, []).append((child, moves))
+        self._joined = {frozenset((parent, child)) for parent, child, _ in joints}
+        below = {child for _, child, _ in joints}
+        names = [link.get("name", "") for link in root.findall("link")]
+        first = [name for name in names if name not in below]
+        self.of = {name: name for name in first}
+        todo = list(first)
+        while todo:
+            parent = todo.pop()
+            for child, moves in children.get(parent, ()):
+                self.of[child] = child if moves else self.of[parent]
+                todo.append(child)
+
+    def may_meet(self, one: str, other: str) -> bool:
+        """Whether two links have shapes, move against each other, and no joint joins them."""
+        apart = self.of[one] != self.of[other] and frozenset((one, other)) not in self._joined
+        return apart and {one, other} <= self._solid
+
+
+def _link(joint: ElementTree.Element, end: str) -> str:
+    found = joint.find(end)
+    return "" if found is None else found.get("link", "")

@@ -29,7 +29,7 @@ from excite_cli.robot.limits import (
     given_limits,
     limits_of,
 )
-from excite_cli.robot.mimic import Mimic
+from excite_cli.robot.loops import Mimic
 from excite_cli.robot.parsed_model import parsed_model, reduced_model
 from excite_cli.robot.posture import Coupling, posture_of, require_known
 

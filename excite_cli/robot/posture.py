@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.robot.limits import JointRange, Limits
-from excite_cli.robot.mimic import Mimic
+from excite_cli.robot.loops import Mimic
 
 _AS_TOLD = 1e-3  # rad or m by which a posture may differ from what a joint follows
 

@@ -15,12 +15,11 @@ from excite_cli.identification.stored_model import StoredModel
 from excite_cli.identification.torque_trace import torque_trace
 from excite_cli.measurement.dataset import Run
 from excite_cli.robot.model import Array
-from excite_cli.scoring.beyond_friction import beyond_friction
 from excite_cli.scoring.drift import Shift
 from excite_cli.scoring.fault_isolation import reasons_of
 from excite_cli.scoring.records import RunExplanation, ScoredRun
 from excite_cli.scoring.thresholds import Residual
-from excite_cli.scoring.tolerance import Allowance, allowance_of, blocks_of, rms_of
+from excite_cli.scoring.tolerance import Allowance, allowance_of, beyond_friction, blocks_of, rms_of
 
 _SAME_RATE = 0.01
 

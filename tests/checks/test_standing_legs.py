@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from excite_cli.checks.samples import Samples
+from excite_cli.checks.setup import Samples
 from excite_cli.checks.standing_legs import standing_legs
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.robot.model import Robot, build_robot

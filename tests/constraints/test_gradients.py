@@ -25,8 +25,7 @@ from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty, inertia_u
 from excite_cli.dynamics.whole_robot import CenterOfMass
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.gradient_check import central_differences
-from excite_cli.proof.enclosed_motion import EnclosedMotion
-from excite_cli.proof.enclosed_trajectory import enclosed_states, intervals_of
+from excite_cli.proof.enclosed_motion import EnclosedMotion, enclosed_states, intervals_of
 from excite_cli.robot.model import Robot, build_robot
 from excite_cli.trajectory.fourier import FourierTrajectory
 from tests.robot.coupled_robots import CLAW, HAND, coupled_robot

@@ -11,8 +11,7 @@ from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty, inertia_uncertainty
-from excite_cli.proof.enclosed_motion import EnclosedMotion
-from excite_cli.proof.enclosed_trajectory import enclosed_states, intervals_of
+from excite_cli.proof.enclosed_motion import EnclosedMotion, enclosed_states, intervals_of
 from excite_cli.robot.model import Robot
 from excite_cli.trajectory.fourier import FourierTrajectory
 from tests.constraints.test_gradients import check_gradients

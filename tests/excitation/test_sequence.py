@@ -31,7 +31,7 @@ from excite_cli.excitation.start import clear_posture, random_start
 from excite_cli.excitation.task import MotionTask
 from excite_cli.store.result_file import read_result
 from excite_cli.workers.base import Here, Workers
-from excite_cli.workers.catalogue import open_workers
+from excite_cli.workers.context import open_workers
 from excite_cli.workers.processes import Processes
 from tests.excitation.smoke import drawn, planned, smoke, task_of
 

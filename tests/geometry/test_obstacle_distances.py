@@ -22,11 +22,16 @@ from excite_cli.excitation.gradient_check import central_differences
 from excite_cli.geometry.capsules import fit_capsules
 from excite_cli.geometry.obstacle_distances import ObstacleDistances
 from excite_cli.geometry.obstacle_pairs import ObstaclePairs, choose_obstacle_pairs
-from excite_cli.geometry.obstacles import Box, build_obstacles
+from excite_cli.geometry.obstacles import (
+    Box,
+    build_obstacles,
+    point_distances,
+    segment_contacts,
+    segment_distances,
+)
 from excite_cli.geometry.reasons import Why, reason_in_words
-from excite_cli.geometry.segment_box import point_distances, segment_contacts, segment_distances
 from excite_cli.robot.capsule import Capsule
-from excite_cli.robot.carried_bodies import carried_bodies
+from excite_cli.robot.link_frame import carried_bodies
 from excite_cli.robot.model import Robot, build_robot
 from tests.robot.random_robots import random_robot
 from tests.robot.smoke_arm import ARM as SMOKE

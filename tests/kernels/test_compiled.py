@@ -18,8 +18,8 @@ from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint
 from excite_cli.excitation import residuals
 from excite_cli.excitation.residuals import ResidualDerivatives, squared_per_instant
 from excite_cli.geometry import pair_distances
+from excite_cli.geometry.mesh_pairs import PairTable
 from excite_cli.geometry.pair_distances import PairDistances
-from excite_cli.geometry.pair_table import PairTable
 from excite_cli.kernels import compiled as kernels
 from excite_cli.kernels.compiled import KERNELS
 from excite_cli.robot.capsule import Capsule

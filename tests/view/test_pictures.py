@@ -15,7 +15,7 @@ from excite_cli.view.rays import fitted_camera
 from excite_cli.view.scene import build_scene
 from excite_cli.view.studio import QUICK, Studio
 from excite_cli.workers.base import Workers
-from excite_cli.workers.catalogue import open_workers
+from excite_cli.workers.context import open_workers
 
 pytest.importorskip("embreex")
 Image = pytest.importorskip("PIL.Image")

@@ -11,7 +11,7 @@ import pytest
 
 from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.workers.base import Here, LostWorkersError, News, NoWorkersError, Workers
-from excite_cli.workers.catalogue import open_workers
+from excite_cli.workers.context import open_workers
 from excite_cli.workers.processes import Processes
 from tests.workers import work
 

@@ -3,11 +3,15 @@
 import numpy as np
 import pytest
 
-from excite_cli.constraints.mesh_clearance import MeshClearance
+from excite_cli.constraints.self_collision import MeshClearance
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
-from excite_cli.geometry.pair_table import PairTable
-from excite_cli.proof.enclosed_motion import EnclosedMotion
-from excite_cli.proof.enclosed_trajectory import Intervals, enclosed_states, intervals_of
+from excite_cli.geometry.mesh_pairs import PairTable
+from excite_cli.proof.enclosed_motion import (
+    EnclosedMotion,
+    Intervals,
+    enclosed_states,
+    intervals_of,
+)
 from excite_cli.trajectory.fourier import FourierTrajectory
 from tests.constraints.test_gradients import check_gradients
 from tests.robot.random_robots import random_robot

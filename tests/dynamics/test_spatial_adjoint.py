@@ -11,12 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from excite_cli.config.robot_spec import RobotSpec
-from excite_cli.dynamics.adjoint import FictitiousInertiaAdjoint
 from excite_cli.dynamics.block_form import block_pull_back
 from excite_cli.dynamics.block_kinematics import body_jacobians, body_motions, joints_of
 from excite_cli.dynamics.regressor import Regressor, standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
-from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint
+from excite_cli.dynamics.spatial_adjoint import FictitiousInertiaAdjoint, SpatialAdjoint
 from excite_cli.excitation.gradient_check import relative_error
 from excite_cli.robot.model import Array, Robot, build_robot
 from tests.robot.coupled_robots import CLAW, HAND, coupled_robot
