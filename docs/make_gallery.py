@@ -30,7 +30,7 @@ from excite_cli.report.style import (
     save_figure,
 )
 from excite_cli.shown.answer import Command
-from excite_cli.summary.diagnosis_data import diagnosis_data
+from excite_cli.summary.diagnosis import diagnosis_data
 from excite_cli.summary.figures import diagnosis_figures
 
 TARGET = Path(__file__).parent / "gallery"

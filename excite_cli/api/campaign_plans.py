@@ -26,7 +26,7 @@ from excite_cli.config.trajectory_spec import FourierSpec
 from excite_cli.diagnosis.candidates import effect_of
 from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.errors import NoAdmissibleMotionError
-from excite_cli.excitation.extension import why_not_planned
+from excite_cli.excitation.effect_columns import why_not_planned
 from excite_cli.excitation.invariant import design_for, invariants
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result

@@ -11,12 +11,11 @@ from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.catalogue import build_constraints
 from excite_cli.errors import ExciteError, FileError
 from excite_cli.excitation.boundary import posture_of
-from excite_cli.excitation.entry import program
+from excite_cli.excitation.entry import PaceLimits, program, slowed_chain
 from excite_cli.excitation.inspection import not_in_config
 from excite_cli.excitation.motion import Doubt
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.result import Result
-from excite_cli.excitation.time_scaling import PaceLimits, slowed_chain
 from excite_cli.export.timed import repeated, require_own_samples
 from excite_cli.motion_formats.catalogue import read_own_motion
 from excite_cli.robot.model import Array, Robot, build_robot

@@ -9,8 +9,7 @@ import numpy as np
 from excite_cli.atomic import write_text_atomically
 from excite_cli.config.load_spec import files_of_config
 from excite_cli.dynamics.base_parameters import find_base_parameters
-from excite_cli.dynamics.inertial_prior import UNSURE, inertial_prior
-from excite_cli.dynamics.pseudo_inertia import body_lengths
+from excite_cli.dynamics.pseudo_inertia import UNSURE, body_lengths, inertial_prior
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.export import actuator_configs, mjcf, urdf

@@ -29,8 +29,8 @@ from excite_cli.shown.answer import Answer
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.simulation.replay import ReplayInput, drift, inertias
 from excite_cli.simulation.set_point_replay import HORIZONS, SetPointInput, set_point_errors
-from excite_cli.summary.set_point_replay import set_point_answer
 from excite_cli.summary.simulation import replay_answer as torque_answer
+from excite_cli.summary.simulation import set_point_answer
 
 _POSTURES = 40
 

@@ -12,8 +12,11 @@ from excite_cli.constraints.setting import Setting
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.geometry.mesh_distances import CoalDistances
-from excite_cli.geometry.obstacle_distances import ObstacleDistances
-from excite_cli.geometry.obstacle_pairs import ObstaclePairs, choose_obstacle_pairs
+from excite_cli.geometry.obstacle_pairs import (
+    ObstacleDistances,
+    ObstaclePairs,
+    choose_obstacle_pairs,
+)
 from excite_cli.geometry.obstacles import Box, Obstacle, build_obstacles
 from excite_cli.geometry.reasons import DroppedPair, Why, counted_reasons, reason_in_words
 from excite_cli.proof.enclosed_distances import EnclosedCapsules, least_clearances

@@ -23,7 +23,7 @@ from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.uncertain_inertias import FitKnowledge
 from excite_cli.errors import FileError
 from excite_cli.excitation.discrimination import SEPARATED, divergences, motions_needed
-from excite_cli.excitation.extension import in_words, why_not_planned
+from excite_cli.excitation.effect_columns import in_words, why_not_planned
 from excite_cli.excitation.problem import Problem, build_problem, predicting
 from excite_cli.excitation.stack import Stack
 from excite_cli.robot.base_joints import BASE_ROWS

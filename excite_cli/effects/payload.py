@@ -24,8 +24,7 @@ from excite_cli.effects.base import (
     Value,
     deviation,
 )
-from excite_cli.effects.judgement import Seen
-from excite_cli.effects.rare_sizes import half_of
+from excite_cli.effects.judgement import Seen, half_of
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.link_frame import LinkFrame, leaves
 from excite_cli.robot.model import Array, Robot

@@ -17,8 +17,7 @@ from excite_cli.criteria.base import Criterion, condition_number, singular_value
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import Regressor
 from excite_cli.dynamics.spatial_adjoint import FictitiousInertiaAdjoint, SpatialAdjoint
-from excite_cli.excitation.effect_columns import SeenColumns
-from excite_cli.excitation.extension import Extension
+from excite_cli.excitation.effect_columns import Extension, SeenColumns
 from excite_cli.excitation.progress import Figure, ProgressMeasure
 from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import Weighting

@@ -27,7 +27,7 @@ from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.boundary import Boundary, build_boundary
 from excite_cli.excitation.discrimination import Discrimination, Separation
-from excite_cli.excitation.extension import Extension, extend
+from excite_cli.excitation.effect_columns import Extension, extend
 from excite_cli.excitation.objective import Objective
 from excite_cli.excitation.prediction import PredictedTorques, Prediction, build_prediction
 from excite_cli.excitation.stack import Stack

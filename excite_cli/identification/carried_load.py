@@ -19,8 +19,8 @@ from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import carried_body
+from excite_cli.effects.judgement import half_of
 from excite_cli.effects.parameter import Value, deviation
-from excite_cli.effects.rare_sizes import half_of
 from excite_cli.effects.signals import Signals
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.identification.errors_of_torque import Errors

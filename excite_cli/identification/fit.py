@@ -14,8 +14,7 @@ import numpy as np
 
 from excite_cli.config.data_spec import IdentificationSpec
 from excite_cli.dynamics.base_parameters import BaseParameters
-from excite_cli.dynamics.inertial_prior import InertialPrior, inertial_prior
-from excite_cli.dynamics.pseudo_inertia import body_lengths
+from excite_cli.dynamics.pseudo_inertia import InertialPrior, body_lengths, inertial_prior
 from excite_cli.dynamics.regressor import standard_parameter_unit, standard_parameters
 from excite_cli.effects.base import Effect, Parameter, Value
 from excite_cli.effects.parameter import unit_of_slider

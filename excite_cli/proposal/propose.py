@@ -12,7 +12,13 @@ from excite_cli.config.load_spec import apply_override, parse_spec, parsed_spec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.excitation.problem import with_shapes
-from excite_cli.proposal.assumed_limits import MOST_ACCELERATION, JointPlan, plan_limits
+from excite_cli.proposal.assumed_limits import (
+    MOST_ACCELERATION,
+    JointPlan,
+    Pace,
+    choose_pace,
+    plan_limits,
+)
 from excite_cli.proposal.cell import Cell, Floor, floor_below, put_cell
 from excite_cli.proposal.feasibility import (
     Comments,
@@ -24,17 +30,15 @@ from excite_cli.proposal.feasibility import (
 )
 from excite_cli.proposal.joints import JointChoice, choose_joints
 from excite_cli.proposal.shapes import (
-    Pace,
     Shapes,
-    choose_pace,
     choose_shapes,
     chosen_srdf,
     disabled_pairs,
 )
 from excite_cli.robot.assumed_inertias import with_assumed_inertias
 from excite_cli.robot.description import RobotDescription
+from excite_cli.robot.mesh_paths import Allow, allow_nothing, load_with_folders
 from excite_cli.robot.model import build_robot
-from excite_cli.robot.package_search import Allow, allow_nothing, load_with_folders
 from excite_cli.robot.srdf import read_srdf, reference_posture, srdf_near
 from excite_cli.robot.urdf_joints import UrdfSurvey
 from excite_cli.shown.record import Shown

@@ -21,8 +21,7 @@ from excite_cli.identification.fit_words import (
 from excite_cli.identification.identify import Identification
 from excite_cli.identification.link_changes import LinkChange
 from excite_cli.identification.stored_model import StoredFit
-from excite_cli.report.error_chart import NOTHING_MOVES, error_charts
-from excite_cli.report.parameter_chart import parameter_charts
+from excite_cli.report.error_chart import NOTHING_MOVES, error_charts, parameter_charts
 from excite_cli.report.residual_chart import residuals_in_time
 from excite_cli.shown.answer import (
     Answer,

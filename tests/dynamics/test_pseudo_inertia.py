@@ -5,7 +5,7 @@ import pytest
 
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.dynamics.pseudo_inertia import body_lengths, nearest_inertias, smallest_eigenvalues
-from excite_cli.effects.rare_sizes import half_of
+from excite_cli.effects.judgement import half_of
 from excite_cli.robot.model import Array, Robot, build_robot
 
 

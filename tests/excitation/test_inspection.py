@@ -21,7 +21,7 @@ from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.geometry.mesh_check import MeshCheck
 from excite_cli.geometry.mesh_distances import CoalDistances
-from excite_cli.geometry.obstacle_distances import ObstacleDistances
+from excite_cli.geometry.obstacle_pairs import ObstacleDistances
 from excite_cli.geometry.pair_distances import PairDistances
 from excite_cli.trajectory.fade import Segment
 from tests.excitation.smoke import CONFIG, drawn, smoke

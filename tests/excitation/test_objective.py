@@ -31,8 +31,7 @@ from excite_cli.excitation.discrimination import (
     motions_needed,
     residual_directions,
 )
-from excite_cli.excitation.effect_columns import EffectColumns
-from excite_cli.excitation.extension import extend
+from excite_cli.excitation.effect_columns import EffectColumns, extend
 from excite_cli.excitation.gradient_check import (
     FOURTH_ORDER_STEP,
     check_gradient,

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty, Piece
 from excite_cli.dynamics.whole_robot import whole_parameters
-from excite_cli.geometry.obstacle_distances import ObstacleDistances
+from excite_cli.geometry.obstacle_pairs import ObstacleDistances
 from excite_cli.geometry.obstacles import Box, Plane
 from excite_cli.geometry.pair_distances import PairDistances
 from excite_cli.proof.enclosed_distances import EnclosedCapsules, least_clearances

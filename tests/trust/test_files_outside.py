@@ -13,8 +13,7 @@ from excite_cli.errors import RobotError
 from excite_cli.proposal.propose import Request, propose
 from excite_cli.robot.allowed_files import OutsideError, needed, own_folder
 from excite_cli.robot.description import load_description
-from excite_cli.robot.mesh_paths import Kind, check_mesh_paths, located
-from excite_cli.robot.package_search import load_with_folders
+from excite_cli.robot.mesh_paths import Kind, check_mesh_paths, load_with_folders, located
 from excite_cli.robot.srdf import srdf_near
 from tests.trust.conftest import XACRO
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from excite_cli.errors import ConfigError
-from excite_cli.excitation.time_scaling import PaceLimits, slowing
+from excite_cli.excitation.entry import PaceLimits, slowing
 from excite_cli.trajectory.base import Trajectory
 from excite_cli.trajectory.bspline import BSplineTrajectory
 from excite_cli.trajectory.fourier import FourierTrajectory

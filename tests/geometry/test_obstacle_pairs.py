@@ -20,8 +20,11 @@ from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.gradient_check import central_differences
 from excite_cli.geometry.capsules import fit_capsules
-from excite_cli.geometry.obstacle_distances import ObstacleDistances
-from excite_cli.geometry.obstacle_pairs import ObstaclePairs, choose_obstacle_pairs
+from excite_cli.geometry.obstacle_pairs import (
+    ObstacleDistances,
+    ObstaclePairs,
+    choose_obstacle_pairs,
+)
 from excite_cli.geometry.obstacles import (
     Box,
     build_obstacles,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from excite_cli.effects.catalogue import kind_named
-from excite_cli.effects.rare_sizes import nearest_of_sign
+from excite_cli.effects.judgement import nearest_of_sign
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -10,9 +10,9 @@ import pytest
 
 from excite_cli.campaign.command import MeasureCommand
 from excite_cli.campaign.measure import StillRunningError
-from excite_cli.campaign.one_at_a_time import held_while_it_runs, left_in
 from excite_cli.campaign.process_table import running
 from excite_cli.campaign.same_motion import is_measured
+from excite_cli.campaign.supervised import held_while_it_runs, left_in
 from excite_cli.shown.note import Note
 from tests.campaign.campaign_process import PATIENCE, begun, program, said, start, take_in, until
 
