@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
+from excite_cli.api.drive_law import with_drive_law
 from excite_cli.api.loading import (
     Case,
     dataset_of,
@@ -13,7 +14,6 @@ from excite_cli.api.loading import (
     robot_base,
     sources_of,
     tell_findings,
-    with_drive_law,
 )
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_text_atomically

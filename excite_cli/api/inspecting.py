@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from excite_cli.api.arguments import checked, page_path
+from excite_cli.api.drive_law import with_drive_law
 from excite_cli.api.loading import (
     Case,
     as_recorded,
@@ -14,7 +15,6 @@ from excite_cli.api.loading import (
     inputs_of,
     load_data,
     measured_case,
-    with_drive_law,
 )
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_atomically, write_text_atomically

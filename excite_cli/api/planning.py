@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from excite_cli.api.arguments import checked
 from excite_cli.api.loading import Case, inputs_of, load_data, states_of_work, with_spec
@@ -111,6 +111,49 @@ Planned = Problem | NextMotion
 PlanProgress = Callable[[int, Progress], None]
 
 
+@dataclass(frozen=True)
+class Planner:
+    """Plans motions of a problem, or the next one after a diagnosis (`following`).
+
+    The others are as those of `plan`; the result is stored at `path`.
+    """
+
+    following: NextMotion | None
+    path: Path | None
+    starts: Motions
+    progress: PlanProgress
+    workers: Workers | None
+    tell: Tell
+
+    def motions(
+        self,
+        at: Problem,
+        begun: Result,
+        most: int | None = None,
+        begin: Sequence[Segment] = (),
+        stored: bool = True,
+    ) -> Result:
+        """Motions on top of `begun`, so many or until the goals are reached; starts: `begin`."""
+        following = self.following
+        goals = Goals(at, following.known if following else None)
+
+        def keep(step: FinishedMotion, current: Result) -> None:
+            if self.path is not None and stored:
+                write_result(self.path, current, at)
+            self.tell(Note(Level.INFO, motion_sentence(step.motion)))
+
+        return continue_run(
+            following.problem if following else at,
+            begun,
+            lambda index: lambda state: self.progress(index, state),
+            keep,
+            at if following else None,
+            begin or load_motions(at, self.starts, tell=self.tell),
+            self.workers,
+            lambda found: len(found.motions) == most or goals.reached(found),
+        )
+
+
 @checked("starts")
 def plan(
     problem: Planned,
@@ -157,39 +200,15 @@ def plan(
     following = problem if isinstance(problem, NextMotion) else None
     model = problem.model if isinstance(problem, NextMotion) else problem
 
-    def run(
-        at: Problem,
-        begun: Result,
-        most: int | None = None,
-        begin: Sequence[Segment] = (),
-        stored: bool = True,
-    ) -> Result:
-        goals = Goals(at, following.known if following else None)
-
-        def keep(step: FinishedMotion, current: Result) -> None:
-            if path is not None and stored:
-                write_result(path, current, at)
-            tell(Note(Level.INFO, motion_sentence(step.motion)))
-
-        return continue_run(
-            following.problem if following else at,
-            begun,
-            lambda index: lambda state: progress(index, state),
-            keep,
-            at if following else None,
-            begin or load_motions(at, starts, tell=tell),
-            workers,
-            lambda found: len(found.motions) == most or goals.reached(found),
-        )
-
+    planner = Planner(following, path, starts, progress, workers, tell)
     read = inputs_of(model, priors, starts, following.name if following else None)
     with held_result(path, overwrite, resume, read):
         tell_idle(1 if workers is None else workers.count, model.restarts, tell)
         at, result = _begun(model, following, priors, path if resume else None, tell)
         fixed = following is not None or not duration_is_free(model.spec)
         if fixed or at is not model or result.priors or len(result.motions) > 1:
-            return run(at, result)
-        found = in_least_time(model, result, run, tell)
+            return planner.motions(at, result)
+        found = in_least_time(planner, model, result)
         if path is not None and not found.stored:
             write_result(path, found.result, found.problem)
         return found.result
@@ -317,20 +336,6 @@ _STEP, _DIGITS = 0.01, 2  # [s] of a duration
 _SAME = 1e-3  # of a duration
 
 
-class Run(Protocol):
-    """Plans motions."""
-
-    def __call__(
-        self,
-        at: Problem,
-        begun: Result,
-        most: int | None = None,
-        begin: Sequence[Segment] = (),
-        stored: bool = True,
-    ) -> Result:
-        """Motions on top of `begun`, so many or until the goals are reached; starts: `begin`."""
-
-
 def duration_is_free(spec: Spec) -> bool:
     """Whether motions may be shorter than the config's: seconds count, and no number is given."""
     sequence, until = spec.sequence, spec.sequence.until
@@ -382,13 +387,13 @@ class Found:
     stored: bool = True
 
 
-def in_least_time(problem: Problem, begun: Result, run: Run, tell: Tell) -> Found:
+def in_least_time(planner: Planner, problem: Problem, begun: Result) -> Found:
     """Motions that reach what is asked for in the fewest seconds that are found, if any do.
 
     `begun`: without motions, or with the first one of the problem's own duration.
     """
     longest = problem.trajectory.duration
-    last, best = Found(problem, run(problem, begun, most=1)), None
+    last, best = Found(problem, planner.motions(problem, begun, most=1)), None
     for tries in range(_TRIES + 1):
         at, result = last.problem, last.result
         goals = Goals(at).of(result)
@@ -400,13 +405,13 @@ def in_least_time(problem: Problem, begun: Result, run: Run, tell: Tell) -> Foun
         if tries == _TRIES or count == 0 or not better or (best is last and needed > _CLOSE):
             break
         words = f"{count} motion{'s' * (count > 1)} of {duration:.4g} s"
-        tell(Note(Level.INFO, f"sequence.until: {words} should be enough"))
+        planner.tell(Note(Level.INFO, f"sequence.until: {words} should be enough"))
         new, stored = of_duration(problem, duration), best is None
         starts = load_motions(at, result) if len(result.motions) == count else ()
         same = new is at and len(result.motions) < count
-        found = run(new, result if same else _without_motions(begun, new), count, starts, stored)
-        last = Found(new, found, stored)
-    return best or Found(last.problem, run(last.problem, last.result))
+        before = result if same else _without_motions(begun, new)
+        last = Found(new, planner.motions(new, before, count, starts, stored), stored)
+    return best or Found(last.problem, planner.motions(last.problem, last.result))
 
 
 def _seconds(found: Found) -> float:

@@ -1,4 +1,4 @@
-"""Whether a log is that of the motion that was to be played.
+"""Whether a log is complete, and that of the motion that was to be played.
 
 Planned and measured positions are laid on each other at the lag at which they agree best. Joints
 are judged whose planned positions deviate by more than `_MOVES` from their mean; what they are off

@@ -1,4 +1,4 @@
-"""How a robot is set up: what the columns of its file are, and how it is mounted."""
+"""How a robot is set up, its columns and its mount; and the instants that checks look at."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Plain YAML data of others: numbers, texts, lists and mappings, and nothing else.
+"""YAML of plain values, within limits: data of others, and configs.
 
 Built straight from the parser's events (libyaml's where it is there): no tags, no aliases, limited
 depth, so that a foreign file can neither run code nor grow in memory, and files of a million

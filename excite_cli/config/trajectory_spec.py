@@ -1,4 +1,4 @@
-"""What a YAML file may say about trajectories and the instants at which they are judged."""
+"""What a YAML file may say about trajectories, their instants, and the work of a model."""
 
 from typing import Annotated, Literal
 

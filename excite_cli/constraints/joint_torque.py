@@ -1,4 +1,4 @@
-"""Bounds on the joint torques that the URDF's inertias predict, or that any of a set would need.
+"""Bounds on joint torques, by the URDF's inertias or any of a set, and what motors may give.
 
 With uncertain inertias the torque Y_j φ of a joint must stay within its limit for every admitted φ:
 limit + min_φ (∓ Y_j φ) ≥ 0. The derivative of that margin is a derivative of the torque with the

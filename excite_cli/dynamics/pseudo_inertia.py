@@ -1,4 +1,4 @@
-"""The 4×4 pseudo-inertia of a body: positive semidefinite if some mass distribution has it.
+"""The 4×4 pseudo-inertia of a body, the nearest real inertias, and what the URDF's are worth.
 
     J = [[Σ, h], [hᵀ, m]],   h = m c,   Σ = ½ tr(I) 1 − I   (Wensing, Kim & Slotine 2018)
 

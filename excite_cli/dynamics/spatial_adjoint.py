@@ -1,4 +1,4 @@
-"""Vector–Jacobian product of the regressor for any weight Z, batched over samples.
+"""Vector–Jacobian products of the regressor: for any weight Z, and by fictitious inertias.
 
 Smooth criteria need many singular pairs, and one inverse-dynamics pass for each is slow. Here all
 pairs are taken at once. By virtual power, with S_i the motion column of row i and f_j(·) the force

@@ -1,4 +1,4 @@
-"""How an effect gets into a simulated robot and into files of models: by default, its formula."""
+"""How an effect gets into a simulated robot and into files of models, MJCF and C."""
 
 from __future__ import annotations
 

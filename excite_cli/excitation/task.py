@@ -1,4 +1,4 @@
-"""One motion to be found, as a nonlinear program in free variables.
+"""One motion to be found, as a nonlinear program in free variables, and its residuals.
 
 x (n·K',) holds, joint after joint, the coordinates of the coefficients in the free directions N of
 the problem's boundary: α = α_0 + N Xᵀ with X = x as (n, K'). Equalities (start and end at rest, and

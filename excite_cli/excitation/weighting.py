@@ -1,4 +1,4 @@
-"""Row weights and column scaling of the regressor: C = diag(w) Y_B diag(s).
+"""Row weights and column scaling of the regressor, C = diag(w) Y_B diag(s); reference states.
 
 The paper's raw form has neither. Row weights 1/noise make rows of different joints comparable;
 column scaling removes the mix of kg, kg·m and kg·m² from the condition number.

@@ -1,4 +1,4 @@
-"""Actuators of an identified robot as Python for Isaac Lab and mjlab.
+"""Actuators of an identified robot for Isaac Lab and mjlab (Python), and for BAM (JSON).
 
 Isaac Lab: `DelayedPDActuatorCfg`, or `ImplicitActuatorCfg` where set points act at once; its
 `friction` and `dynamic_friction` are efforts from Isaac Sim 5 on. mjlab (1.3 or later):

@@ -1,4 +1,4 @@
-"""Distance of the true collision geometry of two groups of links: slow, for judging capsules."""
+"""Distances by coal: of the true collision geometry of groups of links, and of capsules."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import product

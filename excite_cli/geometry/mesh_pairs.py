@@ -1,4 +1,4 @@
-"""Distance of the true meshes of one pair of links, and which pairs of a robot to ask about."""
+"""Distance of the true meshes of one pair of links, its bounds, and which pairs to ask about."""
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""Which capsules are checked against which obstacles, and why the others are not.
+"""Capsules and obstacles: which are checked against which, and how far apart they are.
 
 What stands still is not checked: no motion parts it from an obstacle or brings it there. The other
 pairs are checked, unless a bound on the robot's reach proves that they never meet, or no motion

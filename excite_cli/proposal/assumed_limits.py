@@ -1,4 +1,4 @@
-"""Limits that a plan can work with, where the URDF has none or placeholders.
+"""Limits and pace of a plan, where the URDF has no limits, or placeholders.
 
 A figure is taken for a placeholder where no real joint has it: speeds of 0 or beyond 60 rad/s,
 torques of 0 or from 1000 N·m on, ranges beyond two turns either way. What is assumed lies within

@@ -1,4 +1,4 @@
-"""The cell that a robot stands in, as given at a shell: floor, boxes, walls, joint regions."""
+"""The cell that a robot stands in: as given at a shell, and its floor where none is given."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Which shapes stand for the links of a robot, and which links nothing can stand for."""
+"""Which shapes stand for the links of a robot, and which pairs of links its author ruled out."""
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Errors per joint as dumbbells: two errors of each joint on one line, and what noise leaves."""
+"""Errors per joint as dumbbells, and parameters with their intervals."""
 
 import math
 from collections.abc import Mapping, Sequence

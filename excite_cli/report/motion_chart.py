@@ -1,4 +1,4 @@
-"""A motion joint by joint: position within its limits, its derivatives and torque as shares."""
+"""A motion joint by joint, and the margins of its constraints, over time."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Torque over time, run by run: what was measured, what the model says, what is left."""
+"""Torque over time, run by run, and the residual over what it depends on."""
 
 from collections.abc import Sequence
 from dataclasses import replace

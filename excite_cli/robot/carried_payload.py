@@ -1,4 +1,4 @@
-"""A rigid payload: its inertia, added to the body that carries it, and the capsule around it."""
+"""A rigid payload: its inertia on the body that carries it, and its capsule; a robot's reach."""
 
 from dataclasses import dataclass
 

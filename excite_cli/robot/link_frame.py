@@ -1,4 +1,4 @@
-"""A link by its name: the moved joint that carries it, and its frame in that joint's."""
+"""A link by its name: the moved joint that carries it, and its frame; which joints carry what."""
 
 from dataclasses import dataclass
 

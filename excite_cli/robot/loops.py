@@ -1,4 +1,4 @@
-"""Closed kinematic loops, which a URDF cannot hold: where they are cut, and what lies on them.
+"""Closed kinematic loops, which a URDF cannot hold, and joints that follow others.
 
 A URDF is a tree. What closes a loop stands beside it: <loop_joint> with <link1> and <link2> (Drake;
 our own writing of MuJoCo's <equality> connect and weld), or a <joint> within <gazebo>. The tree is

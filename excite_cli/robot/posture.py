@@ -1,4 +1,4 @@
-"""Where every joint stands by the config; those that follow others stand where these lead them."""
+"""Where every joint stands by the config, and how joints follow others."""
 
 from dataclasses import dataclass
 from functools import cached_property

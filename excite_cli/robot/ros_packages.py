@@ -1,4 +1,4 @@
-"""Where packages of ROS lie, without ROS: by folder names, by package.xml, by its variables."""
+"""Where packages of ROS and of robot_descriptions lie, without ROS."""
 
 import json
 import os

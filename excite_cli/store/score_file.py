@@ -1,4 +1,4 @@
-"""Scores as HDF5: one JSON record."""
+"""Scores as HDF5 (one JSON record), and thresholds of a collision detector as JSON."""
 
 import json
 from collections.abc import Sequence

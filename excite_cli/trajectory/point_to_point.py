@@ -1,4 +1,4 @@
-"""From one state to another: the polynomial of degree five with given q, v, a at both ends.
+"""From one state to another by a quintic, and any trajectory at another pace.
 
 With s = t/T, and p_i the polynomials whose state at one end is one and at the other zero,
 

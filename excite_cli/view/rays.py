@@ -1,4 +1,4 @@
-"""Rays against triangles: which surface they meet first, and whether anything is in the way.
+"""A pinhole camera, and rays against triangles: which surface they meet first, what is in the way.
 
 Embree does the work on the processor, so that pictures need no display and no graphics driver.
 """

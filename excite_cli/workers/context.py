@@ -1,4 +1,4 @@
-"""The workers that a command was given, for whatever part of it has tasks to share.
+"""The workers that were requested, for whatever part of a command has tasks to share.
 
 What is computed does not depend on them, so they are no argument of the functions in between.
 """

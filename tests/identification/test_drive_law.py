@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from excite_cli import identify, load_case
-from excite_cli.api.loading import Case, with_drive_law
+from excite_cli.api.drive_law import with_drive_law
+from excite_cli.api.loading import Case
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.identification.drive_law import FoundLaw, find_law, is_sought
 from excite_cli.measurement.dataset import Dataset
