@@ -12,8 +12,11 @@ from excite_cli.workers.context import open_workers
 
 def single_threaded(threads: int = 1) -> AbstractContextManager[object]:
     """Limit the linear algebra library: its matrices here are too small for many threads."""
-    import scipy.linalg  # noqa: F401  (only libraries that are loaded by then are limited)
+    # Only libraries that are loaded by then are limited: those of SciPy and of Pinocchio.
+    import scipy.linalg  # noqa: F401
     from threadpoolctl import threadpool_limits
+
+    import excite_cli.robot.model  # noqa: F401
 
     return threadpool_limits(limits=threads)
 

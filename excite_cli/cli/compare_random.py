@@ -26,7 +26,7 @@ def compare_random(
     optimized: Path | None = typer.Option(
         None, "--optimized", help="Result of `excite optimize` to compare with."
     ),
-    motions: int | None = typer.Option(None, "--motions", min=1, help="Override sequence.motions."),
+    motions: options.Motions = None,
     seed: options.Seed = None,
     overrides: options.Set = None,
     overwrite: options.Overwrite = False,

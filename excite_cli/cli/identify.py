@@ -31,9 +31,7 @@ def identify(
     fit: Path | None = typer.Option(
         None, "--fit", help="Fit of the robot alone, for --only payload."
     ),
-    link: str | None = typer.Option(
-        None, "--link", help="Link that carries the payload. Default: the last one."
-    ),
+    link: options.Link = None,
     workers: options.Workers = 1,
     scheduler: options.Scheduler = None,
     overwrite: options.Overwrite = False,

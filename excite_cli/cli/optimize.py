@@ -24,7 +24,7 @@ def optimize(
     terminal: Terminal,
     config: options.Config,
     output: options.Output = None,
-    motions: int | None = typer.Option(None, "--motions", min=1, help="Override sequence.motions."),
+    motions: options.Motions = None,
     prior: list[Path] | None = typer.Option(
         None,
         "--prior",
@@ -43,9 +43,7 @@ def optimize(
     fit: Path | None = typer.Option(
         None, "--fit", help="Fit of the robot alone, for --for payload."
     ),
-    link: str | None = typer.Option(
-        None, "--link", help="Link that carries the payload. Default: the last one."
-    ),
+    link: options.Link = None,
     restarts: int | None = typer.Option(
         None, "--starts", min=1, help="Starts per motion, the best kept; optimizer.restarts."
     ),

@@ -50,6 +50,15 @@ HeldOut = Annotated[
     str | None,
     typer.Option("--held-out", metavar="RUN", help="Run kept out of the fit. Default: the last."),
 ]
+OwnHeldOut = Annotated[
+    bool,
+    typer.Option("--held-out", help="Of the model's own data, use only the held-out part."),
+]
+Link = Annotated[
+    str | None,
+    typer.Option("--link", help="Link that carries the payload. Default: the last one."),
+]
+Motions = Annotated[int | None, typer.Option("--motions", min=1, help="Override sequence.motions.")]
 MotionFile = Annotated[
     Path,
     typer.Argument(help="A result file, or a motion: {motion_formats}.", show_default=False),

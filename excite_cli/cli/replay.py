@@ -13,9 +13,7 @@ def replay(
     terminal: Terminal,
     model: options.StoredModel,
     data: options.Data,
-    held_out: bool = typer.Option(
-        False, "--held-out", help="Of the model's own data, use only the held-out part."
-    ),
+    held_out: options.OwnHeldOut = False,
     beside: Path | None = typer.Option(
         None,
         "--beside",

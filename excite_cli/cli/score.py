@@ -14,9 +14,7 @@ def score(
     model: options.StoredModel,
     data: options.Data,
     output: Path | None = options.written("--output", "-o", help="File for the score (HDF5)."),
-    held_out: bool = typer.Option(
-        False, "--held-out", help="Of the model's own data, use only the held-out part."
-    ),
+    held_out: options.OwnHeldOut = False,
     limits: Path | None = options.written(
         "--thresholds",
         metavar="FILE.json",
