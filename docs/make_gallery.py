@@ -19,7 +19,7 @@ from benchmarks.real_robots import DATA, LOGS, Answer, Log, diagnosed, row, tabl
 from docs.gallery_page import HEAD, IN_FULL, OTHERWISE, Diagnosed, page
 from excite_cli import Diagnosis, load_case, load_data, read_diagnosis
 from excite_cli.diagnosis.next_motion import next_experiment
-from excite_cli.report.style import (
+from excite_cli.report.plot_figure import (
     BLUE,
     FORBIDDEN,
     GREEN,

@@ -28,9 +28,9 @@ from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.effect_columns import why_not_planned
 from excite_cli.excitation.invariant import design_for, invariants
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
-from excite_cli.excitation.stack import Stack
 from excite_cli.robot.model import Array, Robot
 from excite_cli.shown.note import Level, Note, Tell
 from excite_cli.store.diagnosis_file import read_diagnosis

@@ -42,11 +42,11 @@ from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.dataset import Dataset, joined, merged
 from excite_cli.report.page import render
 from excite_cli.robot.model import build_robot
+from excite_cli.shown.answer import Shown, show
 from excite_cli.shown.note import Tell, log_note
-from excite_cli.shown.record import Shown, show
-from excite_cli.summary.expectation import noise_in_words
 from excite_cli.summary.inspection import headline, inspection_page, inspection_parts
 from excite_cli.summary.inspection import inspection_answer as inspection_answer
+from excite_cli.summary.weakest import noise_in_words
 
 _ROUNDS = 4  # of looking, each with what the one before would set
 

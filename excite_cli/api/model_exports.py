@@ -16,7 +16,7 @@ from excite_cli.export import actuator_configs, mjcf, urdf
 from excite_cli.export.actuator_configs import joint_values
 from excite_cli.export.c_model import c_model
 from excite_cli.export.drive import Drive, drive_of
-from excite_cli.export.exported import OF_DRIVES, ModelText
+from excite_cli.export.exported import OF_DRIVES, ModelText, with_straight_friction
 from excite_cli.export.parameters import parameters_yaml
 from excite_cli.export.randomization import quantities, randomization
 from excite_cli.given_files import refuse_inputs_as_outputs
@@ -30,7 +30,6 @@ from excite_cli.identification.uncertain_model import (
     uncertain,
 )
 from excite_cli.robot.model import Array, Robot
-from excite_cli.scoring.straight_friction import with_straight_friction
 from excite_cli.shown.note import Level, Note, Tell
 from excite_cli.store.diagnosis_file import read_diagnosis
 from excite_cli.store.fit_file import read_fit

@@ -23,13 +23,13 @@ from excite_cli.diagnosis.words import no_gain_in_words
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.excitation.motion import Doubt
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem, predicting
 from excite_cli.excitation.progress import Progress as Progress
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.run import continue_run, new_result, planned_stack, resumed_result
 from excite_cli.excitation.sequence import FinishedMotion
 from excite_cli.excitation.sequence import most_motions as most_motions
-from excite_cli.excitation.stack import Stack
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.shown.answer import Answer
 from excite_cli.shown.note import Level, Note, Tell, log_note

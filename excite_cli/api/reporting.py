@@ -18,7 +18,7 @@ from excite_cli.excitation.result import Result
 from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.identification.stored_model import StoredFit
 from excite_cli.report.page import render
-from excite_cli.report.style import matplotlib_part, save_figure, save_pages
+from excite_cli.report.plot_figure import matplotlib_part, save_figure, save_pages
 from excite_cli.scoring.records import Score
 from excite_cli.shown.answer import Answer
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis

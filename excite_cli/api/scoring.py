@@ -14,9 +14,8 @@ from excite_cli.errors import ExciteError, FileError
 from excite_cli.identification.split import split, whole
 from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.dataset import Dataset, Finding, Run
-from excite_cli.scoring.drift import Shift, shift_of, with_shift
 from excite_cli.scoring.records import Score, ScoredRun
-from excite_cli.scoring.score import Scorer, together
+from excite_cli.scoring.score import Scorer, Shift, shift_of, together, with_shift
 from excite_cli.scoring.thresholds import Residual, Thresholds, thresholds_of
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.score_file import write_score, write_thresholds

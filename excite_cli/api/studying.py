@@ -24,8 +24,8 @@ from excite_cli.study.case import (
 )
 from excite_cli.study.plan import parse_vary, planned_cases
 from excite_cli.study.records import TABLE, CaseRecord, files_of
-from excite_cli.study.study import StudyNews as StudyNews
-from excite_cli.study.study import run_study as run_cases
+from excite_cli.study.records import StudyNews as StudyNews
+from excite_cli.study.records import run_study as run_cases
 from excite_cli.summary.study import study_answer as study_answer
 from excite_cli.workers.base import Tell, Workers
 

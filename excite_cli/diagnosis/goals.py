@@ -16,9 +16,9 @@ from excite_cli.diagnosis.power import EffectPower, least_sizes, price, times_na
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.invariant import FreeDesign, Invariants, design_for, invariants
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem, predicting
 from excite_cli.excitation.result import Result
-from excite_cli.excitation.stack import Stack
 
 # Beyond this condition number the information cannot be inverted: nothing is precise yet.
 _SINGULAR = 1e7

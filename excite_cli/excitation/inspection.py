@@ -25,7 +25,7 @@ from excite_cli.geometry.reasons import ContactMeaning
 from excite_cli.proof.certificate import Path, ProofVerdict, State, Worst, certify
 from excite_cli.proof.enclosed_motion import Intervals, enclosed_states, intervals_of
 from excite_cli.robot.model import links_by_joint
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 
 # Whether the true collision meshes stay apart between the instants, too.
 #

@@ -12,8 +12,8 @@ import numpy as np
 from excite_cli.constraints.base import Array
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import Regressor
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem, acceleration_bounds
-from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import reference_rows, state_bounds
 from excite_cli.robot.model import Robot
 

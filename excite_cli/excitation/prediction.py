@@ -40,8 +40,7 @@ from excite_cli.effects.base import Effect, Tier
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION, catalogue, kind_named, shows
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.excitation.effect_columns import Extension, extend, why_not_planned
-from excite_cli.excitation.objective import Objective, Spectrum
-from excite_cli.excitation.stack import Stack
+from excite_cli.excitation.objective import Objective, Spectrum, Stack
 from excite_cli.excitation.weighting import Weighting, state_bounds
 from excite_cli.robot.model import Array, Robot
 

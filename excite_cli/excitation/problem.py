@@ -28,9 +28,8 @@ from excite_cli.errors import ConfigError
 from excite_cli.excitation.boundary import Boundary, build_boundary
 from excite_cli.excitation.discrimination import Discrimination, Separation
 from excite_cli.excitation.effect_columns import Extension, extend
-from excite_cli.excitation.objective import Objective
+from excite_cli.excitation.objective import Objective, Stack
 from excite_cli.excitation.prediction import PredictedTorques, Prediction, build_prediction
-from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import (
     Weighting,
     build_weighting,
@@ -39,7 +38,7 @@ from excite_cli.excitation.weighting import (
 )
 from excite_cli.robot.mesh_paths import without_unusable
 from excite_cli.robot.model import Robot, build_robot
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 from excite_cli.trajectory.base import Basis, Trajectory, with_freedom
 from excite_cli.trajectory.catalogue import build_trajectory
 

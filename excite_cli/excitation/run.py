@@ -10,6 +10,7 @@ from excite_cli.config.load_spec import parse_spec, spec_as_yaml
 from excite_cli.config.spec import OptimizerSpec, SequenceSpec, Spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.motion import Doubt
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import ProgressCallback, Status
 from excite_cli.excitation.result import Result, matches
@@ -20,7 +21,6 @@ from excite_cli.excitation.sequence import (
     motions_within,
 )
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
-from excite_cli.excitation.stack import Stack
 from excite_cli.geometry.reasons import dropped_in_words
 from excite_cli.trajectory.fade import Segment
 from excite_cli.workers.base import Workers

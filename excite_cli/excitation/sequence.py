@@ -12,6 +12,7 @@ from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.excitation.admissible import verdicts, worst_margins
 from excite_cli.excitation.base_motion import base_motion
 from excite_cli.excitation.motion import Motion, Outcome
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.one_start import (
     FoundMotion,
     OneStart,
@@ -23,7 +24,6 @@ from excite_cli.excitation.one_start import (
 from excite_cli.excitation.problem import Problem, with_cost_on
 from excite_cli.excitation.progress import Progress, ProgressCallback, Stage, Starts, Status
 from excite_cli.excitation.solvers.base import Solver
-from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import Start, moved_note, start_from
 from excite_cli.excitation.task import MotionTask
 from excite_cli.trajectory.fade import Segment

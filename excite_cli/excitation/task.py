@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from excite_cli.constraints.base import Array, Constraint, Indices, Parts
 from excite_cli.criteria.base import Criterion
 from excite_cli.dynamics.forward_kinematics import States
-from excite_cli.excitation.objective import Evaluation, Spectrum
+from excite_cli.excitation.objective import Evaluation, Spectrum, Stack
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Progress, Stage
-from excite_cli.excitation.stack import Stack
 from excite_cli.kernels.compiled import KERNELS
 from excite_cli.trajectory.base import Basis
 

@@ -44,7 +44,7 @@ from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.link_frame import LinkFrame, carrying_frame
 from excite_cli.robot.model import Array, Robot
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 
 _TIMES_THE_FIT = 2.0  # of the error that the fit had: more is no load
 _COMPACT = 0.05  # m, radius of the load that a motion is planned for, and how far off it hangs

@@ -32,7 +32,7 @@ from excite_cli.identification.link_changes import LinkChange, inertial_covarian
 from excite_cli.identification.prior import as_wide_as_needed, prior_of
 from excite_cli.identification.regression import Regression, follows_model, rebuilt
 from excite_cli.robot.model import Array, Robot
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 
 # A parameter is identifiable if the data fix it to this share of its value or usual size.
 _FIXED = 0.5

@@ -34,14 +34,16 @@ from excite_cli.proposal.shapes import (
     choose_shapes,
     chosen_srdf,
     disabled_pairs,
+    read_srdf,
+    reference_posture,
+    srdf_near,
 )
 from excite_cli.robot.assumed_inertias import with_assumed_inertias
 from excite_cli.robot.description import RobotDescription
 from excite_cli.robot.mesh_paths import Allow, allow_nothing, load_with_folders
 from excite_cli.robot.model import build_robot
-from excite_cli.robot.srdf import read_srdf, reference_posture, srdf_near
 from excite_cli.robot.urdf_joints import UrdfSurvey
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 
 _TORQUE_SHARE = 0.8
 _MARGIN = 0.01

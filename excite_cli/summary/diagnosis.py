@@ -36,8 +36,8 @@ from excite_cli.shown.answer import (
     Text,
     as_word,
     parts_of,
+    show,
 )
-from excite_cli.shown.record import show
 from excite_cli.summary.cells import files_in_words
 from excite_cli.summary.effect_evidence import evidence_section
 from excite_cli.summary.error_by_joint import errors_section

@@ -34,8 +34,8 @@ from excite_cli.shown.answer import (
     Table,
     Text,
     as_word,
+    show,
 )
-from excite_cli.shown.record import show
 from excite_cli.summary.cells import (
     figure,
     files_in_words,

@@ -18,9 +18,7 @@ from excite_cli.excitation.progress import Status
 from excite_cli.excitation.result import Comparison, RandomMotion, Result
 from excite_cli.excitation.sequence import flattered
 from excite_cli.fields import data_of
-from excite_cli.shown.answer import Answer, Detail, Parts, Table
-from excite_cli.shown.record import show
-from excite_cli.summary.expectation import expectation_parts, power_data
+from excite_cli.shown.answer import Answer, Detail, Parts, Table, show
 from excite_cli.summary.pairs import (
     doubts_in_words,
     not_modelled_in_words,
@@ -29,6 +27,7 @@ from excite_cli.summary.pairs import (
     worst_data,
 )
 from excite_cli.summary.problem import problem_parts
+from excite_cli.summary.weakest import expectation_parts, power_data
 from excite_cli.trajectory.fade import Segment
 
 

@@ -9,8 +9,7 @@ import numpy as np
 from excite_cli.fields import data_of
 from excite_cli.robot.model import Array
 from excite_cli.scoring.records import Replay, ReplayedModel, SetPointReplay
-from excite_cli.shown.answer import Answer, Parts, Table
-from excite_cli.shown.record import show
+from excite_cli.shown.answer import Answer, Parts, Table, show
 from excite_cli.simulation.simulate import Simulation
 
 # How far models drift from the robot when its torques are played on them.

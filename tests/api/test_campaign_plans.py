@@ -18,8 +18,8 @@ from excite_cli.config.load_spec import load_spec
 from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.excitation.entry import PaceLimits
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
-from excite_cli.excitation.stack import Stack
 from excite_cli.robot.effort_curve import EffortCurve
 from excite_cli.robot.model import Array
 from excite_cli.trajectory.fade import Segment

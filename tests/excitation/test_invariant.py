@@ -11,9 +11,9 @@ from excite_cli.dynamics.base_parameters import base_parameters_as_given
 from excite_cli.dynamics.regressor import Regressor
 from excite_cli.excitation.gradient_check import check_gradient
 from excite_cli.excitation.invariant import FreeDesign, design_for, invariants
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.sequence import dense_condition_number, flattered
-from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import reference_rows, torque_metric
 from tests.excitation.smoke import drawn, smoke
 

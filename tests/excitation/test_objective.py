@@ -38,11 +38,10 @@ from excite_cli.excitation.gradient_check import (
     fourth_order_differences,
     relative_error,
 )
-from excite_cli.excitation.objective import Objective
+from excite_cli.excitation.objective import Objective, Stack
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import ProgressMeasure
 from excite_cli.excitation.run import new_result
-from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import build_weighting
 from excite_cli.robot.model import Robot
 from excite_cli.trajectory.fourier import FourierTrajectory

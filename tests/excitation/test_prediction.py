@@ -9,9 +9,9 @@ from excite_cli.diagnosis.expectation import expectation
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.gradient_check import check_gradient
 from excite_cli.excitation.inspection import not_modelled
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.prediction import PredictedTorques
 from excite_cli.excitation.problem import Problem, predicting
-from excite_cli.excitation.stack import Stack
 from tests.excitation.smoke import drawn, planned, smoke, stacked
 from tests.excitation.smoke import prediction_of as of
 

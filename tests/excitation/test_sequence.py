@@ -20,13 +20,13 @@ from excite_cli.config.spec import SequenceSpec
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation import one_start, sequence
 from excite_cli.excitation.motion import Motion, Outcome
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.one_start import FoundMotion, StartContext
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Figure, Progress, ProgressMeasure, Status
 from excite_cli.excitation.random_baseline import RandomBaseline, _select, random_baseline
 from excite_cli.excitation.solvers.base import Effort
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
-from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import clear_posture, random_start
 from excite_cli.excitation.task import MotionTask
 from excite_cli.store.result_file import read_result

@@ -10,7 +10,7 @@ import pytest
 
 from excite_cli.errors import FileError, NoAdmissibleMotionError
 from excite_cli.study.case import DoneCase, StudyCase, StudyTask
-from excite_cli.study.study import StudyNews, run_study
+from excite_cli.study.records import StudyNews, run_study
 
 TASK = StudyTask(Path("arm.yaml"), ())
 CASES = [StudyCase(f"seed-{k}", {"seed": str(k)}, None, f"request {k}") for k in (1, 2, 3)]

@@ -7,8 +7,8 @@ import pytest
 
 from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.identification.errors_of_torque import Errors
-from excite_cli.scoring.drift import shift_of, with_shift
 from excite_cli.scoring.records import RunExplanation, ScoredRun
+from excite_cli.scoring.score import shift_of, with_shift
 
 NAMES = ("a", "b", "c", "d", "e", "f")
 NOTHING = Errors(0.1, 0.1, {}, {}, {}, {}, (0.0, 0.0), {}, {})
