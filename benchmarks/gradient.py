@@ -12,7 +12,7 @@ from excite_cli.excitation.gradient_check import (
     central_differences,
     forward_differences,
 )
-from excite_cli.excitation.stack import Stack
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.task import MotionTask
 
 OURS, BARE = "cost and gradient", "bare Pinocchio and LAPACK calls"

@@ -17,10 +17,10 @@ from threadpoolctl import threadpool_limits
 from benchmarks.problems import CONFIGS, BareCalls, interleaved, motion, problem
 from excite_cli.config.load_spec import load_spec
 from excite_cli.excitation.base_motion import base_motion
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.solvers.base import Effort
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
-from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import random_start
 from excite_cli.excitation.task import MotionTask
 

@@ -34,8 +34,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.run import continue_run, new_result
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
-from excite_cli.workers.base import Function, News, Watch, Workers, unwatched
-from excite_cli.workers.here import Here
+from excite_cli.workers.base import Function, Here, News, Watch, Workers, unwatched
 from excite_cli.workers.processes import Processes
 
 GOAL = 1.8

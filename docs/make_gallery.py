@@ -19,7 +19,7 @@ from benchmarks.real_robots import DATA, LOGS, Answer, Log, diagnosed, row, tabl
 from docs.gallery_page import HEAD, IN_FULL, OTHERWISE, Diagnosed, page
 from excite_cli import Diagnosis, load_case, load_data, read_diagnosis
 from excite_cli.diagnosis.next_motion import next_experiment
-from excite_cli.report.style import (
+from excite_cli.report.plot_figure import (
     BLUE,
     FORBIDDEN,
     GREEN,
@@ -30,7 +30,7 @@ from excite_cli.report.style import (
     save_figure,
 )
 from excite_cli.shown.answer import Command
-from excite_cli.summary.diagnosis_data import diagnosis_data
+from excite_cli.summary.diagnosis import diagnosis_data
 from excite_cli.summary.figures import diagnosis_figures
 
 TARGET = Path(__file__).parent / "gallery"

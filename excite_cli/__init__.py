@@ -72,7 +72,7 @@ if TYPE_CHECKING:
     from excite_cli.excitation.inspection import Inspections as Inspections
     from excite_cli.excitation.motion import Motion as Motion
     from excite_cli.excitation.problem import Problem as Problem
-    from excite_cli.excitation.random_comparison import Comparison as Comparison
+    from excite_cli.excitation.result import Comparison as Comparison
     from excite_cli.excitation.result import Result as Result
     from excite_cli.identification.carried_load import LoadIdentification as LoadIdentification
     from excite_cli.identification.fit import Fit as Fit
@@ -93,7 +93,7 @@ if TYPE_CHECKING:
     from excite_cli.simulation.simulate import Simulation as Simulation
     from excite_cli.trajectory.fade import Segment as Segment
     from excite_cli.workers.base import Workers as Workers
-    from excite_cli.workers.catalogue import open_workers as open_workers
+    from excite_cli.workers.context import open_workers as open_workers
 
 __version__ = "0.2.0"
 
@@ -140,11 +140,10 @@ _HOMES = {
         "NoAdmissibleMotionError",
         "RobotError",
     ),
-    "excitation.random_comparison": ("Comparison",),
     "excitation.inspection": ("Inspection", "Inspections"),
     "excitation.motion": ("Motion",),
     "excitation.problem": ("Problem",),
-    "excitation.result": ("Result",),
+    "excitation.result": ("Comparison", "Result"),
     "identification.fit": ("Fit",),
     "identification.identify": ("Identification",),
     "identification.carried_load": ("LoadIdentification",),
@@ -158,7 +157,7 @@ _HOMES = {
     "simulation.simulate": ("Simulation",),
     "trajectory.fade": ("Segment",),
     "workers.base": ("Workers",),
-    "workers.catalogue": ("open_workers",),
+    "workers.context": ("open_workers",),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 

@@ -6,6 +6,7 @@ be written is no error.
 """
 
 import hashlib
+import os
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -16,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.atomic import write_atomically
-from excite_cli.cache_folder import cache_folder
 from excite_cli.errors import FileError
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -61,3 +61,10 @@ def _write(path: Path, arrays: Arrays) -> None:
 
 def _path(key: str) -> Path:
     return cache_folder() / f"meshes-{key[:32]}.npz"
+
+
+def cache_folder() -> Path:
+    """`$XDG_CACHE_HOME/excite` or `~/.cache/excite`."""
+    given = os.environ.get("XDG_CACHE_HOME", "")
+    root = Path(given) if Path(given).is_absolute() else Path("~/.cache").expanduser()
+    return root / "excite"

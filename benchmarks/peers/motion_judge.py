@@ -25,8 +25,8 @@ from excite_cli.constraints.base import Array
 from excite_cli.dynamics.regressor import InverseDynamics, Regressor
 from excite_cli.excitation.admissible import smallest_margins
 from excite_cli.excitation.invariant import invariants
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
-from excite_cli.excitation.stack import Stack
 from excite_cli.geometry.mesh_check import MeshCheck
 
 RATE = 1000.0

@@ -23,11 +23,10 @@ from excite_cli.criteria.base import Criterion
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.regressor import Regressor
 from excite_cli.errors import NoAdmissibleMotionError
-from excite_cli.excitation.objective import Evaluation, Objective
+from excite_cli.excitation.objective import Evaluation, Objective, Stack
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.sequence import generate_motion
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
-from excite_cli.excitation.stack import Stack
 
 # The step of the paper, and of FIGAROH.
 STEP = 1e-6

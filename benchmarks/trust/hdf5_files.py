@@ -24,7 +24,7 @@ from benchmarks.trust.mutations import (
 )
 from benchmarks.trust.trial import Fuzzer
 from excite_cli import diagnose, identify, load_problem, motions_of, plan, save_fit, simulate
-from excite_cli.api.report_figures import read_files
+from excite_cli.api.reporting import read_files
 from excite_cli.excitation.result import Result
 from excite_cli.measurement.dataset import Array
 from excite_cli.store.result_file import read_samples, write_result

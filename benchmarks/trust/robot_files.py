@@ -34,9 +34,8 @@ from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.excitation.problem import build_problem
 from excite_cli.geometry.link_meshes import link_meshes
 from excite_cli.robot.description import example_robots, load_description
-from excite_cli.robot.mesh_paths import check_mesh_paths
+from excite_cli.robot.mesh_paths import check_mesh_paths, needed_folders
 from excite_cli.robot.model import build_robot, links_by_joint
-from excite_cli.robot.package_search import needed_folders
 from excite_cli.robot.urdf_joints import survey
 
 _ROOT = Path(__file__).resolve().parents[2]

@@ -7,7 +7,7 @@ its place, and is told so in one sentence instead of by an error from deep insid
 import errno
 import inspect
 import os
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import cache, wraps
 from numbers import Integral, Real
 from pathlib import Path
@@ -15,6 +15,7 @@ from types import NoneType, UnionType
 from typing import Any, ParamSpec, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from excite_cli.errors import REFUSALS, ConfigError, FileError
+from excite_cli.measurement.dataset import Dataset
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -104,3 +105,54 @@ def _require_name(path: str) -> None:
         raise FileError(f"{path[:_SHOWN]!r} is the name of no file: it holds a zero character.")
     if len(name) > _PATH or max(map(len, name.split(b"/"))) > _NAME:
         raise FileError(f"{path}: {REFUSALS[errno.ENAMETOOLONG]}")
+
+
+# Paths that are given, seen to before any work begins.
+
+
+def existing(path: str | Path) -> Path:
+    """The path of a file or folder that is there.
+
+    Raises
+    ------
+    FileError
+        It is not.
+    """
+    if not Path(path).exists():
+        raise FileError(f"There is no file {path}.")
+    return Path(path)
+
+
+def page_path(path: str | Path, hint: str = "") -> Path:
+    """The path of a page that may be written.
+
+    Raises
+    ------
+    FileError
+        Its name is not that of a page.
+    """
+    if Path(path).suffix.lower() not in (".html", ".htm") and not Path(path).is_dir():
+        raise FileError(f"-o {path}: a report is a page, NAME.html.{hint}")
+    return Path(path)
+
+
+def paths_in(*given: object) -> list[Path]:
+    """Those of `given` that are files, also in lists, and the files that data were read from."""
+    listed = [x for each in given for x in (each if isinstance(each, list | tuple) else [each])]
+    read = [x for each in listed for x in (each.sources if isinstance(each, Dataset) else [each])]
+    return [Path(each) for each in read if isinstance(each, str | Path)]
+
+
+def refuse_twice(paths: Iterable[Path]) -> None:
+    """See that no file is given twice, whatever it is called.
+
+    Raises
+    ------
+    FileError
+        One is.
+    """
+    seen: set[Path] = set()
+    for path in paths:
+        if path.resolve() in seen:
+            raise FileError(f"{path} is given twice.")
+        seen.add(path.resolve())

@@ -9,9 +9,14 @@ from excite_cli.api.checking import check
 from excite_cli.api.exporting import export_file
 from excite_cli.api.loading import Case, load_data, measured_case, problem_of
 from excite_cli.campaign.measure import Measure, NotMeasuredError, StillRunningError, Take
-from excite_cli.campaign.measured_log import is_measured, record_measured, record_of, same_file
 from excite_cli.campaign.records import Campaign, PlayedMotion
-from excite_cli.campaign.same_motion import compared
+from excite_cli.campaign.same_motion import (
+    compared,
+    is_measured,
+    record_measured,
+    record_of,
+    same_file,
+)
 from excite_cli.config.load_spec import parse_spec
 from excite_cli.errors import ExciteError, FileError, NoAdmissibleMotionError
 from excite_cli.motion_formats.catalogue import read_own_motion

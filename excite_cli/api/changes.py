@@ -4,9 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from excite_cli.api.arguments import checked
+from excite_cli.api.arguments import checked, page_path
 from excite_cli.api.outputs import held
-from excite_cli.api.paths import page_path
 from excite_cli.atomic import write_text_atomically
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.report.page import render

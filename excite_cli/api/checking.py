@@ -5,11 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from excite_cli.api.arguments import checked
-from excite_cli.api.least_time import duration_is_free
 from excite_cli.api.motions import Motions, load_motions
+from excite_cli.api.planning import duration_is_free
 from excite_cli.config.load_spec import parse_spec
 from excite_cli.errors import FileError
 from excite_cli.excitation.admissible import path_of
+from excite_cli.excitation.entry import PaceLimits, slowing
 from excite_cli.excitation.inspection import (
     Inspections,
     Look,
@@ -20,7 +21,6 @@ from excite_cli.excitation.inspection import (
 )
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
-from excite_cli.excitation.time_scaling import PaceLimits, slowing
 from excite_cli.proof.certificate import Path as MotionPath
 from excite_cli.robot.model import Array
 from excite_cli.shown.note import Level, Note, Tell, log_note

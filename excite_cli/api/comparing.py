@@ -13,8 +13,7 @@ from excite_cli.errors import FileError
 from excite_cli.excitation.motion import Doubt
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import random_baseline
-from excite_cli.excitation.random_comparison import Comparison
-from excite_cli.excitation.result import Result, matches
+from excite_cli.excitation.result import Comparison, Result, matches
 from excite_cli.store.result_file import read_result, write_result
 from excite_cli.summary.motions import comparison_answer as comparison_answer
 from excite_cli.summary.pairs import doubts_in_words

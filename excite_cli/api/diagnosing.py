@@ -23,7 +23,7 @@ from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.diagnosis.words import no_gain_in_words
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.problem import Problem
-from excite_cli.export.found_config import found_config
+from excite_cli.export.parameters import found_config
 from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.shown.note import Level, Note, Tell, log_note

@@ -1,25 +1,24 @@
 """From a file to what is exported of it: motions repeated, entered from rest, slowed."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from excite_cli.api.approach import Start, entered, start_posture
 from excite_cli.api.motions import is_motion, motions_of
 from excite_cli.config.constraints_spec import ConstraintsSpec, JointLimitsSpec
 from excite_cli.config.load_spec import parse_spec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.catalogue import build_constraints
 from excite_cli.errors import ExciteError, FileError
+from excite_cli.excitation.boundary import posture_of
+from excite_cli.excitation.entry import PaceLimits, program, slowed_chain
+from excite_cli.excitation.inspection import not_in_config
 from excite_cli.excitation.motion import Doubt
-from excite_cli.excitation.not_modelled import not_in_config
-from excite_cli.excitation.problem import build_problem
+from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.result import Result
-from excite_cli.excitation.time_scaling import PaceLimits, slowed_chain
-from excite_cli.export.own_samples import require_own_samples
-from excite_cli.export.timed import repeated
+from excite_cli.export.timed import repeated, require_own_samples
 from excite_cli.motion_formats.catalogue import read_own_motion
-from excite_cli.robot.model import build_robot
+from excite_cli.robot.model import Array, Robot, build_robot
 from excite_cli.shown.answer import Command, as_word
 from excite_cli.shown.note import Level, Note, Tell
 from excite_cli.store.fit_file import fit_knowledge
@@ -27,6 +26,50 @@ from excite_cli.store.result_file import read_result, read_samples
 from excite_cli.summary.pairs import doubts_in_words
 from excite_cli.trajectory.fade import Chain, Segment
 from excite_cli.trajectory.sampled import through_samples
+
+# Motions made playable: entered from rest at a posture, and left for it again.
+
+# Positions by joint [rad, m]; joints not named are at robot.posture.
+Start = Mapping[str, float]
+
+
+def start_posture(robot: Robot, start: Start) -> Array:
+    """The posture (n,) that motions are entered from.
+
+    Raises
+    ------
+    ConfigError
+        A joint is unknown or does not move, or leaves its limits.
+    """
+    return posture_of(robot, dict(start), "--from")
+
+
+def entered(
+    problem: Problem, motions: Sequence[Segment], posture: Array, periods: int, tell: Tell
+) -> list[Chain]:
+    """[entry, motion × periods, return] of every motion, all from rest at `posture` and back.
+
+    Raises
+    ------
+    NoAdmissibleMotionError, ConfigError
+        See `excitation.entry.program`.
+    """
+    found = []
+    for motion in motions:
+        chain = program(problem, motion, posture, periods)
+        found.append(chain)
+        seconds = (f"{name} {each:.3g} s" for name, each in durations_of(chain).items())
+        tell(Note(Level.INFO, f"{motion.name}: {', '.join(seconds)}"))
+    return found
+
+
+def durations_of(chain: Chain) -> dict[str, float]:
+    """Seconds of `motion` (all periods), and of `entry` and `return` where there are any."""
+    seconds: dict[str, float] = {}
+    for segment in chain.segments:
+        name = segment.name if segment.name in ("entry", "return") else "motion"
+        seconds[name] = seconds.get(name, 0.0) + segment.trajectory.duration
+    return seconds
 
 
 @dataclass(frozen=True)

@@ -5,15 +5,19 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from excite_cli.api.approach import Start, durations_of
-from excite_cli.api.arguments import checked
-from excite_cli.api.exported_chains import ChainRequest, ExportedChain, chains_of
+from excite_cli.api.arguments import checked, existing, paths_in
+from excite_cli.api.exported_chains import (
+    ChainRequest,
+    ExportedChain,
+    Start,
+    chains_of,
+    durations_of,
+)
 from excite_cli.api.model_exports import ModelRequest, write_requested
 from excite_cli.api.outputs import held
-from excite_cli.api.paths import existing, paths_in
 from excite_cli.claim import claim, leave
 from excite_cli.errors import ConfigError, FileError, nearest
-from excite_cli.export.model_formats import MODEL_FORMATS
+from excite_cli.export.exported import MODEL_FORMATS
 from excite_cli.export.timed import timed_motion
 from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.motion_formats.base import MotionFormat

@@ -15,7 +15,7 @@ from excite_cli.api.loading import (
     sources_of,
     tell_findings,
 )
-from excite_cli.api.models import write_models
+from excite_cli.api.model_exports import write_models
 from excite_cli.api.outputs import held
 from excite_cli.checks.all_checks import check_dataset
 from excite_cli.config.load_spec import spec_as_yaml
@@ -31,7 +31,7 @@ from excite_cli.measurement.dataset import Dataset
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.fit_file import read_fit, write_fit
 from excite_cli.summary.identification import identification_answer as identification_answer
-from excite_cli.summary.load import load_answer as load_answer
+from excite_cli.summary.identification import load_answer as load_answer
 from excite_cli.workers.base import Workers
 from excite_cli.workers.context import at_hand
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from excite_cli.api.arguments import checked
+from excite_cli.api.arguments import checked, page_path
 from excite_cli.api.drive_law import with_drive_law
 from excite_cli.api.loading import (
     Case,
@@ -17,10 +17,14 @@ from excite_cli.api.loading import (
     measured_case,
 )
 from excite_cli.api.outputs import held
-from excite_cli.api.paths import page_path
 from excite_cli.atomic import write_atomically, write_text_atomically
-from excite_cli.checks import rows
-from excite_cli.checks.all_checks import look
+from excite_cli.checks.all_checks import (
+    look,
+    row_names,
+    rows_in_order,
+    rows_of_description,
+    rows_of_files,
+)
 from excite_cli.checks.check_result import CheckResult
 from excite_cli.checks.sentences import BELONG, written
 from excite_cli.checks.trust import but_trusted, check_names
@@ -28,7 +32,7 @@ from excite_cli.config.commented_yaml import amended, changed_values, with_value
 from excite_cli.config.constraints_spec import ConstraintsSpec
 from excite_cli.config.load_spec import load_spec, spec_of
 from excite_cli.config.plain_yaml import yaml_text
-from excite_cli.config.task_spec import TaskSpec
+from excite_cli.config.trajectory_spec import TaskSpec
 from excite_cli.diagnosis.measured_prior import measured_stack
 from excite_cli.diagnosis.power import EffectPower, sizes_shown
 from excite_cli.errors import ExciteError
@@ -38,11 +42,11 @@ from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.dataset import Dataset, joined, merged
 from excite_cli.report.page import render
 from excite_cli.robot.model import build_robot
+from excite_cli.shown.answer import Shown, show
 from excite_cli.shown.note import Tell, log_note
-from excite_cli.shown.record import Shown, show
-from excite_cli.summary.expectation import noise_in_words
 from excite_cli.summary.inspection import headline, inspection_page, inspection_parts
 from excite_cli.summary.inspection import inspection_answer as inspection_answer
+from excite_cli.summary.weakest import noise_in_words
 
 _ROUNDS = 4  # of looking, each with what the one before would set
 
@@ -104,8 +108,8 @@ def inspect(
     files = [data] if isinstance(data, str | Path) else list(data)
     page = None if output is None else page_path(output)
     with held({"apply": apply, "output": page}, overwrite, inputs_of(problem, *files)):
-        check_names(case.spec, rows.names())
-        found = but_trusted(rows.of_description(case.robot, case.spec), case.spec)
+        check_names(case.spec, row_names())
+        found = but_trusted(rows_of_description(case.robot, case.spec), case.spec)
         settings: dict[str, Any] = {}
         before, more = settings, settings
         runs: tuple[str, ...] = ()
@@ -130,7 +134,7 @@ def inspect(
             if is_all or not more:  # what the dynamics say was tried by them
                 break
             case = _changed(case, more)
-        inspection = LogInspection(rows.in_order(found, bool(files), case.spec), settings, runs)
+        inspection = LogInspection(rows_in_order(found, bool(files), case.spec), settings, runs)
         if power:
             by_law = with_drive_law(case, load_data(case, files, tell), None, tell)
             shown = power_of_data(case, by_law[1])
@@ -179,7 +183,7 @@ def _looked(
     Of a unit or a clock that is not `settled` yet they would say what is wrong.
     """
     told = [e for e in recorded.findings if e.severity != "note" or e.kind == "wrapped"]
-    found = rows.of_files(merged(told), case.spec)
+    found = rows_of_files(merged(told), case.spec)
     if any(each.status == "fault" or {*each.settings} - {*settled} for each in found):
         return found, False
     settled_case, data = with_drive_law(case, completed(case, recorded), None, tell)

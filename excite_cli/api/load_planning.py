@@ -19,8 +19,8 @@ from excite_cli.excitation.result import Result
 from excite_cli.identification.carried_load import ExpectedLoad, expected_load, require_same
 from excite_cli.identification.stored_model import StoredFit
 from excite_cli.robot.link_frame import carrying_frame
+from excite_cli.shown.answer import Shown, show
 from excite_cli.shown.note import Level, Note, Tell, log_note
-from excite_cli.shown.record import Shown, show
 from excite_cli.store.fit_file import read_fit
 from excite_cli.summary.problem import problem_parts
 

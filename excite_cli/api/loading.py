@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from excite_cli.api.arguments import checked
+from excite_cli.api.arguments import checked, paths_in, refuse_twice
 from excite_cli.api.foreign_motions import is_motion, measured_motions, read_segment
-from excite_cli.api.paths import paths_in, refuse_twice
 from excite_cli.base_link.wrench_rows import with_base
 from excite_cli.checks.bodies import bodies_in_words
 from excite_cli.config.load_spec import files_of_config, load_spec, parse_spec, spec_of
@@ -30,8 +29,8 @@ from excite_cli.measurement.torque import with_torques
 from excite_cli.robot.description import is_named
 from excite_cli.robot.model import Array, Robot, build_measured_robot, build_robot
 from excite_cli.robot.overview import describe
+from excite_cli.shown.answer import Shown, show
 from excite_cli.shown.note import Level, Note, Tell, log_note
-from excite_cli.shown.record import Shown, show
 from excite_cli.store.fit_file import fit_knowledge, read_fit
 from excite_cli.summary.inspection import runs_in_words
 from excite_cli.summary.problem import problem_notes

@@ -14,7 +14,7 @@ from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.regression import Series
 from excite_cli.identification.stored_model import StoredModel
 from excite_cli.robot.model import Array
-from excite_cli.shown.record import Shown, show
+from excite_cli.shown.answer import Shown, show
 from excite_cli.store.model_file import read_model
 
 

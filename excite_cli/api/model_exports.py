@@ -1,26 +1,26 @@
 """Identified models for simulators: the part of `excite export` that is about models."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from excite_cli.api.models import for_simulators, write_exported, write_model, write_models
+from excite_cli.atomic import write_text_atomically
 from excite_cli.config.load_spec import files_of_config
 from excite_cli.dynamics.base_parameters import find_base_parameters
-from excite_cli.dynamics.inertial_prior import UNSURE, inertial_prior
-from excite_cli.dynamics.pseudo_inertia import body_lengths
+from excite_cli.dynamics.pseudo_inertia import UNSURE, body_lengths, inertial_prior
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.errors import ConfigError, FileError
-from excite_cli.export import actuator_configs, bam, mjcf
+from excite_cli.export import actuator_configs, mjcf, urdf
+from excite_cli.export.actuator_configs import joint_values
 from excite_cli.export.c_model import c_model
 from excite_cli.export.drive import Drive, drive_of
-from excite_cli.export.exported import ModelText
-from excite_cli.export.joint_values import joint_values
-from excite_cli.export.model_formats import OF_DRIVES
+from excite_cli.export.exported import OF_DRIVES, ModelText, with_straight_friction
+from excite_cli.export.parameters import parameters_yaml
 from excite_cli.export.randomization import quantities, randomization
 from excite_cli.given_files import refuse_inputs_as_outputs
-from excite_cli.identification.fit import effect_parameters
+from excite_cli.identification.fit import Fit, effect_parameters
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.stored_model import StoredModel
 from excite_cli.identification.uncertain_model import (
@@ -30,12 +30,11 @@ from excite_cli.identification.uncertain_model import (
     uncertain,
 )
 from excite_cli.robot.model import Array, Robot
-from excite_cli.scoring.straight_friction import with_straight_friction
 from excite_cli.shown.note import Level, Note, Tell
 from excite_cli.store.diagnosis_file import read_diagnosis
 from excite_cli.store.fit_file import read_fit
 from excite_cli.store.model_file import consistent_model, read_model
-from excite_cli.store.thresholds_file import read_thresholds
+from excite_cli.store.score_file import read_thresholds
 
 
 @dataclass(frozen=True)
@@ -114,8 +113,8 @@ def _actuators(stored: StoredModel, format: str, path: Path, tell: Tell) -> Mode
             "measurement.torque: command."
         )
     if format == "bam":
-        model, _ = with_straight_friction(stored, consistent_model(stored), bam.holds)
-        return bam.bam(robot, model, joint_values(robot, model, drive))
+        model, _ = with_straight_friction(stored, consistent_model(stored), actuator_configs.holds)
+        return actuator_configs.bam(robot, model, joint_values(robot, model, drive))
     values = joint_values(robot, _simple(stored, "mjcf", path, tell), drive)
     written = actuator_configs.isaaclab if format == "isaaclab" else actuator_configs.mjlab
     return written(robot.name, values)
@@ -204,3 +203,61 @@ def _carry(robot: Robot, model: IdentifiedModel) -> Array:
     units = np.eye(len(model.values))
     columns = [IdentifiedModel(model.phi, model.effects, unit).carried(robot) for unit in units]
     return np.stack(columns, axis=1) if columns else np.zeros((len(model.phi), 0))
+
+
+# Identified models as files: URDF, MJCF, YAML of all parameters.
+
+_HOLDS = {"urdf": urdf.holds, "mjcf": mjcf.holds}
+
+
+def write_models(
+    robot: Robot,
+    fit: Fit,
+    paths: Mapping[str, str | Path | None],
+    tell: Tell,
+    drive: Drive | None = None,
+) -> None:
+    """Write `fit` to the paths that are given: `urdf`, `mjcf`, `parameters` (YAML).
+
+    What a format cannot hold is reported. `drive`: what the robot's set points are followed by.
+    """
+    for kind, path in paths.items():
+        if path is not None and kind == "parameters":
+            write_text_atomically(Path(path), parameters_yaml(robot, fit))
+        elif path is not None:
+            write_model(robot, fit.best_model, kind, Path(path), tell, drive)
+
+
+def for_simulators(stored: StoredModel, kind: str) -> tuple[IdentifiedModel, tuple[str, ...]]:
+    """A model with bodies that can be, and with friction of a form that `kind` holds; a note."""
+    model = consistent_model(stored)
+    model, joints = with_straight_friction(stored, model, _HOLDS[kind])
+    if not joints:
+        return model, ()
+    text = (
+        f"friction of {', '.join(joints)} is approximated by viscous and Coulomb friction, as "
+        f"{kind.upper()} has no other"
+    )
+    return model, (text,)
+
+
+def write_model(
+    robot: Robot,
+    model: IdentifiedModel,
+    kind: str,
+    path: Path,
+    tell: Tell,
+    drive: Drive | None = None,
+) -> None:
+    """Write a model as `kind`: `urdf` or `mjcf`; what that cannot hold is reported."""
+    if kind == "urdf":
+        write_exported(urdf.updated_urdf(robot, model), path, tell)
+    else:
+        write_exported(mjcf.mjcf(robot, model, drive), path, tell)
+
+
+def write_exported(exported: ModelText, path: Path, tell: Tell) -> None:
+    """Write a model's text, and report what is not in it."""
+    write_text_atomically(path, exported.text)
+    for note in exported.notes:
+        tell(Note(Level.NOTE, f"{path}: {note}"))

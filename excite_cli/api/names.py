@@ -27,7 +27,7 @@ def motion_formats() -> list[str]:
 
 def export_formats() -> list[str]:
     """Formats of `excite export`, of motions first."""
-    from excite_cli.export.model_formats import MODEL_FORMATS
+    from excite_cli.export.exported import MODEL_FORMATS
 
     return [*motion_formats(), *MODEL_FORMATS]
 

@@ -1,16 +1,20 @@
 """Motions one after the other, each with all earlier data stacked: `excite optimize`."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from excite_cli.api.arguments import checked
-from excite_cli.api.least_time import as_planned, duration_is_free, in_least_time
-from excite_cli.api.loading import Case, inputs_of, load_data, states_of_work
+from excite_cli.api.loading import Case, inputs_of, load_data, states_of_work, with_spec
 from excite_cli.api.motions import Motions, is_motion, load_motions, tell_doubts
 from excite_cli.api.outputs import held_result
 from excite_cli.api.working import tell_idle
-from excite_cli.diagnosis.goals import Goals
+from excite_cli.config.load_spec import parse_spec, spec_as_yaml
+from excite_cli.config.spec import Spec
+from excite_cli.config.trajectory_spec import FourierSpec, GridSpec, SamplingSpec
+from excite_cli.diagnosis.goals import Goal, Goals
 from excite_cli.diagnosis.measured_prior import measured_stack
 from excite_cli.diagnosis.next_motion import NextMotion
 from excite_cli.diagnosis.next_motion import plan_after as after_diagnosis
@@ -18,16 +22,14 @@ from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.diagnosis.words import no_gain_in_words
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import ConfigError, FileError
-from excite_cli.excitation.ending import most_motions as most_motions
 from excite_cli.excitation.motion import Doubt
-from excite_cli.excitation.planned_prior import planned_stack
-from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.objective import Stack
+from excite_cli.excitation.problem import Problem, predicting
 from excite_cli.excitation.progress import Progress as Progress
 from excite_cli.excitation.result import Result
-from excite_cli.excitation.run import continue_run, new_result, resumed_result
+from excite_cli.excitation.run import continue_run, new_result, planned_stack, resumed_result
 from excite_cli.excitation.sequence import FinishedMotion
-from excite_cli.excitation.stack import Stack
-from excite_cli.excitation.with_prediction import predicting
+from excite_cli.excitation.sequence import most_motions as most_motions
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.shown.answer import Answer
 from excite_cli.shown.note import Level, Note, Tell, log_note
@@ -39,6 +41,7 @@ from excite_cli.summary.motions import motion_sentence
 from excite_cli.summary.motions import plan_answer as answer_of_plan
 from excite_cli.summary.pairs import doubts_in_words
 from excite_cli.summary.problem import problem_notes
+from excite_cli.trajectory.catalogue import build_trajectory
 from excite_cli.trajectory.fade import Segment
 from excite_cli.workers.base import Workers
 
@@ -108,6 +111,49 @@ Planned = Problem | NextMotion
 PlanProgress = Callable[[int, Progress], None]
 
 
+@dataclass(frozen=True)
+class Planner:
+    """Plans motions of a problem, or the next one after a diagnosis (`following`).
+
+    The others are as those of `plan`; the result is stored at `path`.
+    """
+
+    following: NextMotion | None
+    path: Path | None
+    starts: Motions
+    progress: PlanProgress
+    workers: Workers | None
+    tell: Tell
+
+    def motions(
+        self,
+        at: Problem,
+        begun: Result,
+        most: int | None = None,
+        begin: Sequence[Segment] = (),
+        stored: bool = True,
+    ) -> Result:
+        """Motions on top of `begun`, so many or until the goals are reached; starts: `begin`."""
+        following = self.following
+        goals = Goals(at, following.known if following else None)
+
+        def keep(step: FinishedMotion, current: Result) -> None:
+            if self.path is not None and stored:
+                write_result(self.path, current, at)
+            self.tell(Note(Level.INFO, motion_sentence(step.motion)))
+
+        return continue_run(
+            following.problem if following else at,
+            begun,
+            lambda index: lambda state: self.progress(index, state),
+            keep,
+            at if following else None,
+            begin or load_motions(at, self.starts, tell=self.tell),
+            self.workers,
+            lambda found: len(found.motions) == most or goals.reached(found),
+        )
+
+
 @checked("starts")
 def plan(
     problem: Planned,
@@ -154,39 +200,15 @@ def plan(
     following = problem if isinstance(problem, NextMotion) else None
     model = problem.model if isinstance(problem, NextMotion) else problem
 
-    def run(
-        at: Problem,
-        begun: Result,
-        most: int | None = None,
-        begin: Sequence[Segment] = (),
-        stored: bool = True,
-    ) -> Result:
-        goals = Goals(at, following.known if following else None)
-
-        def keep(step: FinishedMotion, current: Result) -> None:
-            if path is not None and stored:
-                write_result(path, current, at)
-            tell(Note(Level.INFO, motion_sentence(step.motion)))
-
-        return continue_run(
-            following.problem if following else at,
-            begun,
-            lambda index: lambda state: progress(index, state),
-            keep,
-            at if following else None,
-            begin or load_motions(at, starts, tell=tell),
-            workers,
-            lambda found: len(found.motions) == most or goals.reached(found),
-        )
-
+    planner = Planner(following, path, starts, progress, workers, tell)
     read = inputs_of(model, priors, starts, following.name if following else None)
     with held_result(path, overwrite, resume, read):
         tell_idle(1 if workers is None else workers.count, model.restarts, tell)
         at, result = _begun(model, following, priors, path if resume else None, tell)
         fixed = following is not None or not duration_is_free(model.spec)
         if fixed or at is not model or result.priors or len(result.motions) > 1:
-            return run(at, result)
-        found = in_least_time(model, result, run, tell)
+            return planner.motions(at, result)
+        found = in_least_time(planner, model, result)
         if path is not None and not found.stored:
             write_result(path, found.result, found.problem)
         return found.result
@@ -295,3 +317,130 @@ def sizes_asked(given: Sequence[str], planned: Planned) -> dict[str, float]:
     if found:
         predicting(planned.model if isinstance(planned, NextMotion) else planned, tuple(found))
     return found
+
+
+# Motions as short as what `sequence.until` asks for allows: their duration is a variable, too.
+#
+# Information grows with seconds, hardly with how they are divided (`diagnosis/goals.py`). So one
+# motion of the duration T that the config has says how many seconds it takes, t = T · needed, and
+# n = ⌈t / T⌉ motions of t / n [s] are planned. Where these show less than is asked for, or more,
+# the same is done with what they show.
+
+# Motions of at least this share of the config's duration: joints need time to use their range.
+_SHORTEST = 0.2
+_FEWEST_HARMONICS, _FEWEST_POINTS = 5, 15
+_ROOM = 1.02  # seconds planned for, of those that are expected to do
+_CLOSE = 0.9  # information needed, of what motions have that are short enough
+_TRIES = 3
+_STEP, _DIGITS = 0.01, 2  # [s] of a duration
+_SAME = 1e-3  # of a duration
+
+
+def duration_is_free(spec: Spec) -> bool:
+    """Whether motions may be shorter than the config's: seconds count, and no number is given."""
+    sequence, until = spec.sequence, spec.sequence.until
+    return sequence.motions is None and until is not None and until.counts_seconds
+
+
+def as_planned(problem: Problem, result: Result) -> Problem:
+    """The problem, of motions as short as those of `result`, where their duration is free."""
+    if not result.motions or not duration_is_free(problem.spec):
+        return problem
+    stored = parse_spec(result.config, "the config stored in the result")
+    return of_duration(problem, build_trajectory(stored.trajectory).duration)
+
+
+def of_duration(problem: Problem, duration: float) -> Problem:
+    """The problem of motions of `duration` [s], no faster in their shape: with fewer coefficients.
+
+    The cost has as many samples as before, the constraints have them as densely.
+    """
+    spec, before = problem.spec, problem.trajectory.duration
+    if abs(duration - before) < _SAME * before:
+        return problem
+    trajectory, duration = spec.trajectory, round(duration, _DIGITS)
+    if isinstance(trajectory, FourierSpec):
+        count = _fewer(trajectory.harmonics, duration / before, _FEWEST_HARMONICS)
+        shape: dict[str, Any] = {"base_frequency": 2.0 * math.pi / duration, "harmonics": count}
+    else:
+        count = _fewer(trajectory.control_points, duration / before, _FEWEST_POINTS)
+        shape = {"duration": duration, "control_points": count}
+    sampling = SamplingSpec(
+        cost=GridSpec(samples=spec.sampling.cost.samples),
+        constraints=GridSpec(step=spec.sampling.constraints.step),
+    )
+    new = {"trajectory": trajectory.model_copy(update=shape), "sampling": sampling}
+    return with_spec(problem, spec.model_copy(update=new))
+
+
+def _fewer(count: int | None, share: float, fewest: int) -> int:
+    assert count is not None  # of a problem
+    return min(count, max(fewest, int(count * share)))
+
+
+@dataclass(frozen=True)
+class Found:
+    """Motions of a problem, and whether they are the ones that were stored last."""
+
+    problem: Problem
+    result: Result
+    stored: bool = True
+
+
+def in_least_time(planner: Planner, problem: Problem, begun: Result) -> Found:
+    """Motions that reach what is asked for in the fewest seconds that are found, if any do.
+
+    `begun`: without motions, or with the first one of the problem's own duration.
+    """
+    longest = problem.trajectory.duration
+    last, best = Found(problem, planner.motions(problem, begun, most=1)), None
+    for tries in range(_TRIES + 1):
+        at, result = last.problem, last.result
+        goals = Goals(at).of(result)
+        needed = max(goal.needed for goal in goals)
+        if needed <= 1.0 and (best is None or _seconds(last) < _seconds(best)):
+            best = last
+        count, duration = _wanted(at, goals, len(result.motions), longest)
+        better = best is None or count * duration < _seconds(best)
+        if tries == _TRIES or count == 0 or not better or (best is last and needed > _CLOSE):
+            break
+        words = f"{count} motion{'s' * (count > 1)} of {duration:.4g} s"
+        planner.tell(Note(Level.INFO, f"sequence.until: {words} should be enough"))
+        new, stored = of_duration(problem, duration), best is None
+        starts = load_motions(at, result) if len(result.motions) == count else ()
+        same = new is at and len(result.motions) < count
+        before = result if same else _without_motions(begun, new)
+        last = Found(new, planner.motions(new, before, count, starts, stored), stored)
+    return best or Found(last.problem, planner.motions(last.problem, last.result))
+
+
+def _seconds(found: Found) -> float:
+    return len(found.result.motions) * found.problem.trajectory.duration
+
+
+def _without_motions(begun: Result, problem: Problem) -> Result:
+    """What `begun` is before its motions, for those of another duration."""
+    return replace(
+        begun,
+        config=spec_as_yaml(problem.spec),
+        row_weights=problem.weighting.rows,
+        column_scales=problem.column_scales,
+        motions=(),
+        stack=begun.prior_stack,
+    )
+
+
+def _wanted(at: Problem, goals: Sequence[Goal], motions: int, longest: float) -> tuple[int, float]:
+    """How many motions of how many seconds reach the `goals` that so many `motions` have.
+
+    As few motions as can; none, where no number of them does, or not in the time of all.
+    """
+    own, until = at.trajectory.duration, at.spec.sequence.until
+    allowed = math.inf if until is None or until.duration is None else until.duration
+    for count in range(1, most_motions(at.spec.sequence) + 1):
+        needed = max(goal.needed * goal.fitted(motions) / goal.fitted(count) for goal in goals)
+        duration = max(_ROOM * own * needed, _SHORTEST * longest)
+        if duration <= longest:
+            duration = min(math.ceil(duration / _STEP) * _STEP, longest)
+            return (count, duration) if count * duration <= allowed else (0, 0.0)
+    return 0, 0.0

@@ -16,10 +16,10 @@ from excite_cli.proposal.propose import Proposal, Request
 from excite_cli.proposal.propose import propose as propose_config
 from excite_cli.robot.allowed_files import FolderRequest as FolderRequest
 from excite_cli.robot.description import EXAMPLE_PREFIX, example_robots, is_named
+from excite_cli.robot.mesh_paths import Allow as Allow
+from excite_cli.robot.mesh_paths import allow_nothing, load_with_folders
 from excite_cli.robot.model import build_robot
 from excite_cli.robot.overview import DescribedRobot, describe, known_robots
-from excite_cli.robot.package_search import Allow as Allow
-from excite_cli.robot.package_search import allow_nothing, load_with_folders
 from excite_cli.robot.urdf_joints import survey
 from excite_cli.shown.answer import Answer
 from excite_cli.shown.note import Level, Note, Tell, log_note

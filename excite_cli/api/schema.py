@@ -14,7 +14,7 @@ from excite_cli.shown.answer import Answer
 
 def schema_tree() -> dict[str, Any]:
     """The schema, with the names of a family's members where a text (`x-family`) is one of them."""
-    from excite_cli.checks import rows
+    from excite_cli.checks.all_checks import row_names
     from excite_cli.constraints.catalogue import own_constraints, settings_of
     from excite_cli.criteria.catalogue import CRITERIA
     from excite_cli.effects.catalogue import EFFECTS
@@ -29,7 +29,7 @@ def schema_tree() -> dict[str, Any]:
     names = {
         "effects": EFFECTS.names,
         "criteria": CRITERIA.names,
-        "checks": [*rows.names()],
+        "checks": [*row_names()],
         "torque_sources": TORQUE_SOURCES.names,
     }
     whole = Spec.model_json_schema()

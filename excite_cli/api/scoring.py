@@ -5,28 +5,24 @@ from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
-from excite_cli.api.arguments import checked
+from excite_cli.api.arguments import checked, refuse_twice
 from excite_cli.api.loading import Case, load_data, tell_findings
 from excite_cli.api.model import Model, load_model
 from excite_cli.api.outputs import held
-from excite_cli.api.paths import refuse_twice
 from excite_cli.checks.all_checks import look
 from excite_cli.errors import ExciteError, FileError
 from excite_cli.identification.split import split, whole
 from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.dataset import Dataset, Finding, Run
-from excite_cli.scoring.drift import Shift, shift_of, with_shift
 from excite_cli.scoring.records import Score, ScoredRun
-from excite_cli.scoring.score import Scorer, together
+from excite_cli.scoring.score import Scorer, Shift, shift_of, together, with_shift
 from excite_cli.scoring.thresholds import Residual, Thresholds, thresholds_of
 from excite_cli.shown.note import Level, Note, Tell, log_note
-from excite_cli.store.score_file import write_score
-from excite_cli.store.thresholds_file import write_thresholds
+from excite_cli.store.score_file import write_score, write_thresholds
 from excite_cli.summary.score import score_answer as score_answer
 from excite_cli.summary.score import thresholds_parts as thresholds_parts
-from excite_cli.workers.base import News, Workers
+from excite_cli.workers.base import Here, News, Workers
 from excite_cli.workers.base import Tell as WorkersTell
-from excite_cli.workers.here import Here
 
 
 @checked()

@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from excite_cli.api.approach import Start, entered, start_posture
 from excite_cli.api.arguments import checked
+from excite_cli.api.exported_chains import Start, entered, start_posture
 from excite_cli.api.loading import Case, inputs_of, measured_case, problem_of
 from excite_cli.api.motions import Motions, load_motions
 from excite_cli.api.outputs import held

@@ -22,11 +22,10 @@ from excite_cli.study.case import (
     do_with,
     overrides_of,
 )
-from excite_cli.study.plan import planned_cases
+from excite_cli.study.plan import parse_vary, planned_cases
 from excite_cli.study.records import TABLE, CaseRecord, files_of
-from excite_cli.study.study import StudyNews as StudyNews
-from excite_cli.study.study import run_study as run_cases
-from excite_cli.study.vary import parse_vary
+from excite_cli.study.records import StudyNews as StudyNews
+from excite_cli.study.records import run_study as run_cases
 from excite_cli.summary.study import study_answer as study_answer
 from excite_cli.workers.base import Tell, Workers
 

@@ -5,11 +5,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from excite_cli.api.arguments import checked
+from excite_cli.api.arguments import checked, existing, paths_in
 from excite_cli.api.loading import load_problem, rebuilt_problem
 from excite_cli.api.motions import Motions, load_motions, motions_of, tell_doubts
 from excite_cli.api.outputs import held
-from excite_cli.api.paths import existing, paths_in
 from excite_cli.atomic import write_atomically
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.excitation.problem import Problem

@@ -5,14 +5,18 @@ from contextlib import AbstractContextManager
 
 from excite_cli.shown.note import Level, Note, Tell, saying
 from excite_cli.workers.base import Workers
-from excite_cli.workers.catalogue import open_workers
+from excite_cli.workers.context import open_workers
 
 # How many threads the linear algebra library takes.
 
 
 def single_threaded(threads: int = 1) -> AbstractContextManager[object]:
     """Limit the linear algebra library: its matrices here are too small for many threads."""
+    # Only libraries that are loaded by then are limited: those of SciPy and of Pinocchio.
+    import scipy.linalg  # noqa: F401
     from threadpoolctl import threadpool_limits
+
+    import excite_cli.robot.model  # noqa: F401
 
     return threadpool_limits(limits=threads)
 

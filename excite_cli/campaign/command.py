@@ -7,8 +7,13 @@ from pathlib import Path
 from typing import BinaryIO
 
 from excite_cli.campaign.measure import Measure, NotMeasuredError, StillRunningError, Take
-from excite_cli.campaign.one_at_a_time import held_while_it_runs
-from excite_cli.campaign.supervised import CannotRunError, Held, followed, held_signals
+from excite_cli.campaign.supervised import (
+    CannotRunError,
+    Held,
+    followed,
+    held_signals,
+    held_while_it_runs,
+)
 from excite_cli.campaign.supervisor import Job, ProgramExit
 from excite_cli.errors import ConfigError
 from excite_cli.shown.note import Level, Note, Tell, log_note, saying

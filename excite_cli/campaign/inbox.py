@@ -17,7 +17,7 @@ from pathlib import Path
 
 from excite_cli.atomic import write_atomically, write_text_atomically
 from excite_cli.campaign.measure import Measure, Take
-from excite_cli.campaign.measured_log import digest_of, record_measured
+from excite_cli.campaign.same_motion import digest_of, record_measured
 from excite_cli.claim import claim, leave
 from excite_cli.errors import refusal
 

@@ -12,7 +12,7 @@ from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.errors import FileError, refusal
 from excite_cli.robot.model import Robot
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 
 # At what pace the motions of a round are played at least, and which effects a motion looks for.
 

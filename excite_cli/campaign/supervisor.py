@@ -26,7 +26,6 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from excite_cli.campaign.measured_log import record_measured
 from excite_cli.campaign.process_table import (
     Escalation,
     Process,
@@ -37,6 +36,7 @@ from excite_cli.campaign.process_table import (
     in_words,
     start_of,
 )
+from excite_cli.campaign.same_motion import record_measured
 from excite_cli.errors import ExciteError
 
 _POLL, _KILLING, _IN_VAIN = 0.2, 0.02, 1.0  # s

@@ -11,7 +11,7 @@ import numpy as np
 
 from excite_cli.checks.base import DescriptionCheck, Log
 from excite_cli.checks.check_result import CheckResult, Status
-from excite_cli.robot.formats.urdf_parts import origin_of
+from excite_cli.robot.formats.base import origin_of
 from excite_cli.robot.model import Array, Robot
 
 # Mass, centre and inertia of every link, as the description writes them.

@@ -12,8 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from excite_cli.checks.check_result import CheckResult, Status
-from excite_cli.checks.samples import samples_of
-from excite_cli.checks.setup import Setup
+from excite_cli.checks.setup import Setup, samples_of
 from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Robot

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.checks.catalogue import setup_checks
-from excite_cli.checks.samples import Samples
-from excite_cli.checks.setup import Setup
+from excite_cli.checks.setup import Samples, Setup
 from excite_cli.checks.setup_check import Alternative, SetupCheck
 from excite_cli.checks.textbook_fit import FLOOR, TextbookFit, TextbookShares
 from excite_cli.checks.trust import is_trusted

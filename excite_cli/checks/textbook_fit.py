@@ -25,9 +25,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag
 
-from excite_cli.checks.samples import FEWEST, Samples
-from excite_cli.checks.setup import Setup
-from excite_cli.dynamics.inertial_prior import inertial_prior
+from excite_cli.checks.setup import FEWEST, Samples, Setup
+from excite_cli.dynamics.pseudo_inertia import inertial_prior
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.measurement.dataset import Mask

@@ -9,8 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from excite_cli.checks.samples import LAGS
-from excite_cli.checks.setup import Setup
+from excite_cli.checks.setup import LAGS, Setup
 from excite_cli.checks.setup_check import Alternative, Settings, SetupCheck, descended
 from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
 from excite_cli.config.spec import Spec

@@ -1,125 +1,87 @@
 """`excite campaign`: plan, have it measured, diagnose, plan the next."""
 
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
+from excite_cli.api.showing import Tell, saying
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
 from excite_cli.errors import ConfigError
 
-_MEASURED, _BUDGET, _SIMULATED = "Measured by", "Pace and budget", "Simulated robot"
+if TYPE_CHECKING:
+    from excite_cli.api.campaigning import Measure
+    from excite_cli.api.loading import Case
+
+_measured = partial(typer.Option, rich_help_panel="Measured by")
+_budget = partial(typer.Option, rich_help_panel="Pace and budget")
+_simulated = partial(typer.Option, rich_help_panel="Simulated robot")
 
 
+@options.command
 def campaign(
+    terminal: Terminal,
     config: options.Config,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the campaign.")] = Path(
-        "campaign"
+    output: Path = typer.Option(Path("campaign"), "--output", "-o", help="Folder of the campaign."),
+    measure: str | None = _measured(
+        None,
+        "--measure",
+        metavar="COMMAND",
+        help="Program that plays {motion} and writes the log {data}; or: simulate.",
     ),
-    measure: Annotated[
-        str | None,
-        typer.Option(
-            "--measure",
-            rich_help_panel=_MEASURED,
-            metavar="COMMAND",
-            help="Program that plays {motion} and writes the log {data}; or: simulate.",
-        ),
-    ] = None,
-    inbox: Annotated[
-        Path | None,
-        typer.Option(
-            "--inbox",
-            rich_help_panel=_MEASURED,
-            help="Exchange folder: excite writes motions here and expects their logs here.",
-        ),
-    ] = None,
-    log: Annotated[
-        str, typer.Option("--log", rich_help_panel=_MEASURED, help="Suffix of the logs.")
-    ] = ".csv",
-    timeout: Annotated[
-        float | None,
-        typer.Option(
-            "--timeout",
-            rich_help_panel=_MEASURED,
-            min=0.001,
-            help="Seconds for one motion. Default: five times the motion and a minute.",
-        ),
-    ] = None,
-    retries: Annotated[
-        int,
-        typer.Option(
-            "--retries", rich_help_panel=_MEASURED, min=0, help="Further tries for a motion."
-        ),
-    ] = 2,
-    no_entry: Annotated[
-        bool,
-        typer.Option(
-            "--no-entry",
-            rich_help_panel=_MEASURED,
-            help="Do not enter motions from rest at robot.posture, and go back to it.",
-        ),
-    ] = False,
-    from_speed: Annotated[
-        float,
-        typer.Option(
-            "--from-speed",
-            rich_help_panel=_BUDGET,
-            min=0.01,
-            max=1.0,
-            help="Share of the limits of speed, acceleration and jerk in the first round; it "
-            "doubles from round to round.",
-        ),
-    ] = 1.0,
-    max_rounds: Annotated[
-        int,
-        typer.Option("--max-rounds", rich_help_panel=_BUDGET, min=1, help="Rounds at the most."),
-    ] = 8,
-    max_seconds: Annotated[
-        float,
-        typer.Option(
-            "--max-seconds",
-            rich_help_panel=_BUDGET,
-            min=0.0,
-            help="No new round after so much motion [s]; 0: unlimited.",
-        ),
-    ] = 0.0,
-    plain: Annotated[
-        bool,
-        typer.Option(
-            "--plain",
-            rich_help_panel=_BUDGET,
-            help="No exploration motions: only those that excite the model's own effects.",
-        ),
-    ] = False,
-    effect: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--effect",
-            rich_help_panel=_SIMULATED,
-            metavar="KIND@JOINT=VALUE…",
-            help="With --measure simulate: an effect of the robot, as for `excite simulate`.",
-        ),
-    ] = None,
-    inertia_error: Annotated[
-        float,
-        typer.Option(
-            "--inertia-error",
-            rich_help_panel=_SIMULATED,
-            help="With --measure simulate: deviation of its inertias from the URDF.",
-        ),
-    ] = 0.2,
+    inbox: Path | None = _measured(
+        None,
+        "--inbox",
+        help="Exchange folder: excite writes motions here and expects their logs here.",
+    ),
+    log: str = _measured(".csv", "--log", help="Suffix of the logs."),
+    timeout: float | None = _measured(
+        None,
+        "--timeout",
+        min=0.001,
+        help="Seconds for one motion. Default: five times the motion and a minute.",
+    ),
+    retries: int = _measured(2, "--retries", min=0, help="Further tries for a motion."),
+    no_entry: bool = _measured(
+        False,
+        "--no-entry",
+        help="Do not enter motions from rest at robot.posture, and go back to it.",
+    ),
+    from_speed: float = _budget(
+        1.0,
+        "--from-speed",
+        min=0.01,
+        max=1.0,
+        help="Share of the limits of speed, acceleration and jerk in the first round; it "
+        "doubles from round to round.",
+    ),
+    max_rounds: int = _budget(8, "--max-rounds", min=1, help="Rounds at the most."),
+    max_seconds: float = _budget(
+        0.0, "--max-seconds", min=0.0, help="No new round after so much motion [s]; 0: unlimited."
+    ),
+    plain: bool = _budget(
+        False,
+        "--plain",
+        help="No exploration motions: only those that excite the model's own effects.",
+    ),
+    effect: list[str] | None = _simulated(
+        None,
+        "--effect",
+        metavar="KIND@JOINT=VALUE…",
+        help="With --measure simulate: an effect of the robot, as for `excite simulate`.",
+    ),
+    inertia_error: float = _simulated(
+        0.2,
+        "--inertia-error",
+        help="With --measure simulate: deviation of its inertias from the URDF.",
+    ),
     seed: options.Seed = None,
     overrides: options.Set = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with the campaign in the folder.")
-    ] = False,
+    resume: bool = typer.Option(False, "--resume", help="Go on with the campaign in the folder."),
     workers: options.Workers = 1,
     scheduler: options.Scheduler = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
-    no_progress: options.NoProgress = False,
 ) -> None:
     """Plan motions, have them measured, diagnose, and plan the next, until the model converges.
 
@@ -154,11 +116,9 @@ def campaign(
         run_campaign,
     )
     from excite_cli.api.loading import load_case
-    from excite_cli.api.working import single_threaded, working
-    from excite_cli.cli.measured_by import measured_by
+    from excite_cli.api.working import working
     from excite_cli.cli.start_line import start_line
 
-    terminal = Terminal(as_json, quiet, verbose, not no_progress)
     if (measure is None) == (inbox is None):
         raise ConfigError(
             "say who measures: --measure 'COMMAND {motion} {data}', --measure simulate, or "
@@ -168,12 +128,11 @@ def campaign(
         raise ConfigError("--effect and --inertia-error belong to --measure simulate.")
     asked = CampaignOptions(from_speed, max_rounds, max_seconds, not no_entry, plain)
     with (
-        single_threaded(),
         working(workers, scheduler, 1, terminal.tell) as place,
         terminal.live("campaign") as line,
     ):
         case = load_case(config, options.changes(overrides, seed=seed))
-        way = measured_by(
+        way = _measured_by(
             case, measure, inbox, log, timeout, tuple(effect or ()), inertia_error, terminal.tell
         )
         found = run_campaign(
@@ -188,3 +147,25 @@ def campaign(
             tell=terminal.tell,
         )
     terminal.show(campaign_answer(found, output, {"model": MODEL, "page": PAGE}))
+
+
+def _measured_by(
+    case: "Case",
+    measure: str | None,
+    inbox: Path | None,
+    suffix: str,
+    limit: float | None,
+    effects: tuple[str, ...],
+    inertia_error: float,
+    tell: Tell,
+) -> "Measure":
+    """A program, a folder for people who carry files, or a simulated robot."""
+    from excite_cli.api.campaigning import Inbox, MeasureCommand, Simulated, SimulationSettings
+
+    if inbox is not None:
+        return Inbox(inbox, saying(tell), suffix)
+    assert measure is not None
+    if measure == "simulate":
+        settings = SimulationSettings(seed=case.spec.seed, inertia_error=inertia_error)
+        return Simulated(case, effects, settings)
+    return MeasureCommand.of(measure, suffix, limit, tell)

@@ -1,48 +1,36 @@
 """`excite compare`: what changed between days."""
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
-from excite_cli.cli.help_page import OUTPUT
 from excite_cli.errors import ConfigError
 
 
+@options.command
 def compare(
-    files: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="OLD NEW…",
-            help="Fits, diagnoses or scores of one robot, in order of time.",
-            show_default=False,
-        ),
-    ],
-    covariate: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--covariate",
-            metavar="NAME=V,V,…",
-            help="Regress out this covariate, with a value per file; columns of logs are known.",
-        ),
-    ] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="NAME.html",
-            help="A page with the friction of every joint over the days.",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = None,
+    terminal: Terminal,
+    files: list[Path] = typer.Argument(
+        ...,
+        metavar="OLD NEW…",
+        help="Fits, diagnoses or scores of one robot, in order of time.",
+        show_default=False,
+    ),
+    covariate: list[str] | None = typer.Option(
+        None,
+        "--covariate",
+        metavar="NAME=V,V,…",
+        help="Regress out this covariate, with a value per file; columns of logs are known.",
+    ),
+    output: Path | None = options.written(
+        "--output",
+        "-o",
+        metavar="NAME.html",
+        help="A page with the friction of every joint over the days.",
+    ),
     overwrite: options.Overwrite = False,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
-    no_progress: options.NoProgress = False,
 ) -> None:
     """Report which parameters and effects changed over time, each with its test.
 
@@ -56,13 +44,10 @@ def compare(
     """
     from excite_cli.api.changes import changes_answer
     from excite_cli.api.changes import compare as compare_files
-    from excite_cli.api.working import single_threaded
 
-    terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    with single_threaded():
-        found = compare_files(
-            files, dict(map(_column, covariate or ())), output=output, overwrite=overwrite
-        )
+    found = compare_files(
+        files, dict(map(_column, covariate or ())), output=output, overwrite=overwrite
+    )
     terminal.show(changes_answer(found, output))
 
 

@@ -1,52 +1,38 @@
 """`excite compare-random`: optimised motions beside the best of many random ones."""
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
-from excite_cli.cli.help_page import OUTPUT
 
 
+@options.command
 def compare_random(
+    terminal: Terminal,
     config: options.Config,
-    candidates: Annotated[
-        int, typer.Option("--candidates", min=1, help="Minimum number of random motions.")
-    ] = 300,
-    budget: Annotated[
-        float | None,
-        typer.Option(
-            "--seconds",
-            min=0.0,
-            help="Draw at least this long; 0: the number alone counts, so that the result can be "
-            "reproduced. Default: as long as the optimiser took.",
-        ),
-    ] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", help="Write both to this result file.", rich_help_panel=OUTPUT
-        ),
-    ] = None,
-    optimized: Annotated[
-        Path | None,
-        typer.Option("--optimized", help="Result of `excite optimize` to compare with."),
-    ] = None,
-    motions: Annotated[
-        int | None, typer.Option("--motions", min=1, help="Override sequence.motions.")
-    ] = None,
+    candidates: int = typer.Option(
+        300, "--candidates", min=1, help="Minimum number of random motions."
+    ),
+    budget: float | None = typer.Option(
+        None,
+        "--seconds",
+        min=0.0,
+        help="Draw at least this long; 0: the number alone counts, so that the result can "
+        "be reproduced. Default: as long as the optimiser took.",
+    ),
+    output: Path | None = options.written("--output", "-o", help="Write both to this result file."),
+    optimized: Path | None = typer.Option(
+        None, "--optimized", help="Result of `excite optimize` to compare with."
+    ),
+    motions: options.Motions = None,
     seed: options.Seed = None,
     overrides: options.Set = None,
     overwrite: options.Overwrite = False,
     threads: options.Threads = 1,
     workers: options.Workers = 1,
     scheduler: options.Scheduler = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
-    no_progress: options.NoProgress = False,
 ) -> None:
     """Compare with random motions under the same constraints, as in the paper's Tables I and II.
 
@@ -64,15 +50,13 @@ def compare_random(
     from excite_cli.api.loading import load_problem
     from excite_cli.api.outputs import held
     from excite_cli.api.planning import plan
-    from excite_cli.api.working import single_threaded, working
+    from excite_cli.api.working import working
     from excite_cli.cli.start_line import iterations_of, start_line
 
-    terminal = Terminal(as_json, quiet, verbose, not no_progress)
     inputs = (config,) if optimized is None else (config, optimized)
     changes = options.changes(overrides, seed=seed, motions=motions)
     with (
         held({"output": output}, overwrite, inputs),
-        single_threaded(threads),
         working(workers, scheduler, threads, terminal.tell) as place,
     ):
         problem = load_problem(config, changes, terminal.tell)

@@ -1,7 +1,6 @@
 """`excite diagnose`: what the declared model lacks, and the error before and after."""
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
@@ -12,41 +11,28 @@ from excite_cli.cli.help_page import OUTPUT
 _ASKED = "the answer so far follows in some seconds; Ctrl-C again ends the command without it."
 
 
+@options.command
 def diagnose(
+    terminal: Terminal,
     config: options.Config,
     data: options.Data,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", help="File for the diagnosis (HDF5).", rich_help_panel=OUTPUT
-        ),
-    ] = None,
+    output: Path | None = options.written("--output", "-o", help="File for the diagnosis (HDF5)."),
     held_out: options.HeldOut = None,
-    apply: Annotated[
-        Path | None,
-        typer.Option(
-            "--apply",
-            metavar="NEW.yaml",
-            help="Write the config with the effects found, if the held-out error fell.",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = None,
-    apply_unconfirmed: Annotated[
-        bool,
-        typer.Option(
-            "--apply-unconfirmed",
-            help="Let --apply write it even where that error did not fall.",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = False,
+    apply: Path | None = options.written(
+        "--apply",
+        metavar="NEW.yaml",
+        help="Write the config with the effects found, if the held-out error fell.",
+    ),
+    apply_unconfirmed: bool = typer.Option(
+        False,
+        "--apply-unconfirmed",
+        help="Let --apply write it even where that error did not fall.",
+        rich_help_panel=OUTPUT,
+    ),
     workers: options.Workers = 1,
     scheduler: options.Scheduler = None,
     overwrite: options.Overwrite = False,
     overrides: options.Set = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
-    no_progress: options.NoProgress = False,
 ) -> None:
     """Find what the declared model lacks: friction, springs, payloads, delays and more.
 
@@ -65,12 +51,10 @@ def diagnose(
     from excite_cli.api.diagnosing import diagnose as diagnose_data
     from excite_cli.api.diagnosing import diagnosis_answer
     from excite_cli.api.loading import load_case
-    from excite_cli.api.working import single_threaded, working
+    from excite_cli.api.working import working
     from excite_cli.cli.stopping import answer_so_far
 
-    terminal = Terminal(as_json, quiet, verbose, not no_progress)
     with (
-        single_threaded(),
         working(workers, scheduler, 1, terminal.tell) as place,
         terminal.live("diagnose", 10) as line,
         answer_so_far(lambda: terminal.say(_ASKED)) as ended,
@@ -89,4 +73,4 @@ def diagnose(
             ended=ended,
         )
     written = {"diagnosis": output, "config": apply if found.good or apply_unconfirmed else None}
-    terminal.show(diagnosis_answer(found, str(config), written, verbose))
+    terminal.show(diagnosis_answer(found, str(config), written, terminal.verbose))

@@ -1,104 +1,75 @@
 """`excite export`: motions for controllers, identified models for simulators."""
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.completion import complete_format
 from excite_cli.cli.console import Terminal
-from excite_cli.cli.help_page import OUTPUT
 from excite_cli.cli.options import start_from
 from excite_cli.errors import ConfigError
 
 
+@options.command
 def export(
-    file: Annotated[
-        Path,
-        typer.Argument(help="A result file, a motion (CSV, …), or a model.", show_default=False),
-    ],
-    format_: Annotated[
-        str,
-        typer.Option(
-            "--format",
-            "-f",
-            metavar="FORMAT",
-            help="{motion_formats} of motions; urdf, mjcf, c, randomization of models; isaaclab, "
-            "mjlab, bam of those whose robot follows set points; yaml of fits.",
-            autocompletion=complete_format,
-        ),
-    ],
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            help="File, or folder of a bag. Default: named after FILE.",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = None,
-    motion: Annotated[
-        str, typer.Option("--motion", metavar="I|all", help="Which motion of a result file.")
-    ] = "all",
-    rate: Annotated[float, typer.Option("--rate", help="Instants per second [Hz].")] = 1000.0,
-    equidistant: Annotated[
-        bool,
-        typer.Option("--equidistant", help="Stretch the step so that all steps are equal."),
-    ] = False,
-    periods: Annotated[
-        int, typer.Option("--periods", min=1, help="Repeat a closed motion this many times.")
-    ] = 1,
-    slow: Annotated[
-        float | None,
-        typer.Option(
-            "--slow",
-            metavar="SHARE",
-            help="Slow down until speeds, accelerations and jerks keep this share of their limits.",
-        ),
-    ] = None,
-    entry: Annotated[
-        bool,
-        typer.Option("--entry", help="Enter the motion from rest at a posture, and go back to it."),
-    ] = False,
-    posture: Annotated[
-        str | None,
-        typer.Option(
-            "--from",
-            metavar="JOINT=VALUE,…",
-            help="The posture of --entry [rad, m]; joints not named are at robot.posture.",
-        ),
-    ] = None,
-    thresholds: Annotated[
-        Path | None,
-        typer.Option(
-            "--thresholds",
-            metavar="FILE.json",
-            help="Thresholds of `score --thresholds`: adds a collision detector to c.",
-        ),
-    ] = None,
-    samples: Annotated[
-        int | None,
-        typer.Option(
-            "--samples", min=1, help="With -f randomization: robots to draw. Default: 100."
-        ),
-    ] = None,
-    seed: Annotated[
-        int | None,
-        typer.Option("--seed", min=0, help="With -f randomization: of the draw. Default: 1."),
-    ] = None,
-    allow_unproved: Annotated[
-        bool,
-        typer.Option(
-            "--allow-unproved",
-            help="Write motions that changed since they were proved, too.",
-        ),
-    ] = False,
+    terminal: Terminal,
+    file: Path = typer.Argument(
+        ..., help="A result file, a motion (CSV, …), or a model.", show_default=False
+    ),
+    format_: str = typer.Option(
+        ...,
+        "--format",
+        "-f",
+        metavar="FORMAT",
+        help="{motion_formats} of motions; urdf, mjcf, c, randomization of models; "
+        "isaaclab, mjlab, bam of those whose robot follows set points; yaml of fits.",
+        autocompletion=complete_format,
+    ),
+    output: Path | None = options.written(
+        "--output", "-o", help="File, or folder of a bag. Default: named after FILE."
+    ),
+    motion: str = typer.Option(
+        "all", "--motion", metavar="I|all", help="Which motion of a result file."
+    ),
+    rate: float = typer.Option(1000.0, "--rate", help="Instants per second [Hz]."),
+    equidistant: bool = typer.Option(
+        False, "--equidistant", help="Stretch the step so that all steps are equal."
+    ),
+    periods: int = typer.Option(
+        1, "--periods", min=1, help="Repeat a closed motion this many times."
+    ),
+    slow: float | None = typer.Option(
+        None,
+        "--slow",
+        metavar="SHARE",
+        help="Slow down until speeds, accelerations and jerks keep this share of their limits.",
+    ),
+    entry: bool = typer.Option(
+        False, "--entry", help="Enter the motion from rest at a posture, and go back to it."
+    ),
+    posture: str | None = typer.Option(
+        None,
+        "--from",
+        metavar="JOINT=VALUE,…",
+        help="The posture of --entry [rad, m]; joints not named are at robot.posture.",
+    ),
+    thresholds: Path | None = typer.Option(
+        None,
+        "--thresholds",
+        metavar="FILE.json",
+        help="Thresholds of `score --thresholds`: adds a collision detector to c.",
+    ),
+    samples: int | None = typer.Option(
+        None, "--samples", min=1, help="With -f randomization: robots to draw. Default: 100."
+    ),
+    seed: int | None = typer.Option(
+        None, "--seed", min=0, help="With -f randomization: of the draw. Default: 1."
+    ),
+    allow_unproved: bool = typer.Option(
+        False, "--allow-unproved", help="Write motions that changed since they were proved, too."
+    ),
     overwrite: options.Overwrite = False,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
-    no_progress: options.NoProgress = False,
 ) -> None:
     """Write motions in the formats that controllers take, or a model for simulators and in C.
 
@@ -123,27 +94,24 @@ def export(
       excite export fit.h5 --format randomization --samples 100 --seed 1
     """
     from excite_cli.api.exporting import export_answer, export_file
-    from excite_cli.api.working import single_threaded
 
-    terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    with single_threaded():
-        found = export_file(
-            file,
-            format_,
-            output,
-            chosen=_numbers(motion),
-            rate=rate,
-            equidistant=equidistant,
-            periods=periods,
-            slow=slow,
-            start=start_from(posture, entry),
-            thresholds=thresholds,
-            samples=samples,
-            seed=seed,
-            allow_unproved=allow_unproved,
-            overwrite=overwrite,
-            tell=terminal.tell,
-        )
+    found = export_file(
+        file,
+        format_,
+        output,
+        chosen=_numbers(motion),
+        rate=rate,
+        equidistant=equidistant,
+        periods=periods,
+        slow=slow,
+        start=start_from(posture, entry),
+        thresholds=thresholds,
+        samples=samples,
+        seed=seed,
+        allow_unproved=allow_unproved,
+        overwrite=overwrite,
+        tell=terminal.tell,
+    )
     terminal.show(export_answer(found))
 
 

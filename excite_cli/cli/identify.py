@@ -2,13 +2,11 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
-from excite_cli.cli.help_page import OUTPUT
 
 
 class Load(StrEnum):
@@ -17,48 +15,27 @@ class Load(StrEnum):
     PAYLOAD = "payload"
 
 
+@options.command
 def identify(
+    terminal: Terminal,
     config: options.Config,
     data: options.Data,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", help="File for the fit (HDF5).", rich_help_panel=OUTPUT),
-    ] = None,
-    urdf: Annotated[
-        Path | None,
-        typer.Option(
-            "--urdf", help="Write the URDF with what was identified.", rich_help_panel=OUTPUT
-        ),
-    ] = None,
-    mjcf: Annotated[
-        Path | None,
-        typer.Option("--mjcf", help="Write a MuJoCo model of it (MJCF).", rich_help_panel=OUTPUT),
-    ] = None,
-    parameters: Annotated[
-        Path | None,
-        typer.Option("--parameters", help="Write all parameters (YAML).", rich_help_panel=OUTPUT),
-    ] = None,
+    output: Path | None = options.written("--output", "-o", help="File for the fit (HDF5)."),
+    urdf: Path | None = options.written("--urdf", help="Write the URDF with what was identified."),
+    mjcf: Path | None = options.written("--mjcf", help="Write a MuJoCo model of it (MJCF)."),
+    parameters: Path | None = options.written("--parameters", help="Write all parameters (YAML)."),
     held_out: options.HeldOut = None,
-    only: Annotated[
-        Load | None,
-        typer.Option("--only", help="Find what the robot carries, on top of --fit."),
-    ] = None,
-    fit: Annotated[
-        Path | None,
-        typer.Option("--fit", help="Fit of the robot alone, for --only payload."),
-    ] = None,
-    link: Annotated[
-        str | None,
-        typer.Option("--link", help="Link that carries the payload. Default: the last one."),
-    ] = None,
+    only: Load | None = typer.Option(
+        None, "--only", help="Find what the robot carries, on top of --fit."
+    ),
+    fit: Path | None = typer.Option(
+        None, "--fit", help="Fit of the robot alone, for --only payload."
+    ),
+    link: options.Link = None,
     workers: options.Workers = 1,
     scheduler: options.Scheduler = None,
     overwrite: options.Overwrite = False,
     overrides: options.Set = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
-    no_progress: options.NoProgress = False,
 ) -> None:
     """Find the parameters of the declared model, with their standard deviations.
 
@@ -78,10 +55,9 @@ def identify(
     from excite_cli.api.identifying import identification_answer, identify_load, load_answer
     from excite_cli.api.identifying import identify as identify_data
     from excite_cli.api.loading import load_case
-    from excite_cli.api.working import single_threaded, working
+    from excite_cli.api.working import working
     from excite_cli.errors import ConfigError
 
-    terminal = Terminal(as_json, quiet, verbose, not no_progress)
     models = {"urdf": urdf, "mjcf": mjcf, "parameters": parameters}
     if only is not None:
         given = {"-o": output, "--held-out": held_out}
@@ -91,7 +67,7 @@ def identify(
             raise ConfigError(f"--only payload takes no {', '.join(others)}: leave it out.")
         if fit is None:
             raise ConfigError("--only payload needs --fit: a fit of the robot without it.")
-        with single_threaded(), terminal.live("identify"):
+        with terminal.live("identify"):
             case = load_case(config, overrides or ())
             load = identify_load(case, data, fit, link, tell=terminal.tell)
         terminal.show(load_answer(load))
@@ -99,7 +75,6 @@ def identify(
     if fit is not None or link is not None:
         raise ConfigError("--fit and --link belong to --only payload.")
     with (
-        single_threaded(),
         working(workers, scheduler, 1, terminal.tell) as place,
         terminal.live("identify") as line,
     ):

@@ -2,7 +2,6 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
@@ -20,74 +19,51 @@ class Purpose(StrEnum):
     PAYLOAD = "payload"
 
 
+@options.command
 def optimize(
+    terminal: Terminal,
     config: options.Config,
     output: options.Output = None,
-    motions: Annotated[
-        int | None, typer.Option("--motions", min=1, help="Override sequence.motions.")
-    ] = None,
-    prior: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--prior",
-            help="Result file, motion (CSV, .npz, …) or measured data stacked as earlier data (may "
-            "be repeated).",
-        ),
-    ] = None,
-    start: Annotated[
-        Path | None,
-        typer.Option(
-            "--start", help="Motions from which the search starts: a result file, CSV, .npz, …"
-        ),
-    ] = None,
-    after: Annotated[
-        Path | None,
-        typer.Option("--after", help="Plan the next motion after this diagnosis."),
-    ] = None,
-    purpose: Annotated[
-        Purpose | None,
-        typer.Option("--for", help="payload: shortest motion that identifies one, given --fit."),
-    ] = None,
-    fit: Annotated[
-        Path | None,
-        typer.Option("--fit", help="Fit of the robot alone, for --for payload."),
-    ] = None,
-    link: Annotated[
-        str | None,
-        typer.Option("--link", help="Link that carries the payload. Default: the last one."),
-    ] = None,
-    restarts: Annotated[
-        int | None,
-        typer.Option(
-            "--starts", min=1, help="Starts per motion, the best kept; optimizer.restarts."
-        ),
-    ] = None,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="A first look: one start, 50 iterations.")
-    ] = False,
-    power: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--power",
-            metavar="KIND=SIZE",
-            help="Probability of naming an effect of this size (may be repeated).",
-        ),
-    ] = None,
-    efficiency: Annotated[
-        bool,
-        typer.Option("--efficiency", help="Information efficiency relative to free states, too."),
-    ] = False,
+    motions: options.Motions = None,
+    prior: list[Path] | None = typer.Option(
+        None,
+        "--prior",
+        help="Result file, motion (CSV, .npz, …) or measured data stacked as earlier data "
+        "(may be repeated).",
+    ),
+    start: Path | None = typer.Option(
+        None, "--start", help="Motions from which the search starts: a result file, CSV, .npz, …"
+    ),
+    after: Path | None = typer.Option(
+        None, "--after", help="Plan the next motion after this diagnosis."
+    ),
+    purpose: Purpose | None = typer.Option(
+        None, "--for", help="payload: shortest motion that identifies one, given --fit."
+    ),
+    fit: Path | None = typer.Option(
+        None, "--fit", help="Fit of the robot alone, for --for payload."
+    ),
+    link: options.Link = None,
+    restarts: int | None = typer.Option(
+        None, "--starts", min=1, help="Starts per motion, the best kept; optimizer.restarts."
+    ),
+    quick: bool = typer.Option(False, "--quick", help="A first look: one start, 50 iterations."),
+    power: list[str] | None = typer.Option(
+        None,
+        "--power",
+        metavar="KIND=SIZE",
+        help="Probability of naming an effect of this size (may be repeated).",
+    ),
+    efficiency: bool = typer.Option(
+        False, "--efficiency", help="Information efficiency relative to free states, too."
+    ),
     seed: options.Seed = None,
     overrides: options.Set = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue an existing file.")] = False,
+    resume: bool = typer.Option(False, "--resume", help="Continue an existing file."),
     overwrite: options.Overwrite = False,
     threads: options.Threads = 1,
     workers: options.Workers = 1,
     scheduler: options.Scheduler = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
-    no_progress: options.NoProgress = False,
 ) -> None:
     """Find motions that excite the inertial parameters and the listed effects.
 
@@ -120,10 +96,9 @@ def optimize(
     from excite_cli.api.loading import load_case, load_problem
     from excite_cli.api.outputs import held_result, result_path
     from excite_cli.api.planning import Planned, plan, plan_after, plan_answer, sizes_asked
-    from excite_cli.api.working import single_threaded, working
+    from excite_cli.api.working import working
     from excite_cli.cli.start_line import iterations_of, start_line
 
-    terminal = Terminal(as_json, quiet, verbose, not no_progress)
     if after is not None and prior:
         raise ConfigError("--after brings the measured data with it: leave --prior out.")
     if purpose is None:
@@ -144,7 +119,6 @@ def optimize(
     )
     with (
         held_result(path, overwrite, resume, inputs),
-        single_threaded(threads),
         working(workers, scheduler, threads, terminal.tell) as place,
     ):
         planned: Planned

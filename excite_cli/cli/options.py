@@ -1,11 +1,15 @@
 """Options that several commands share, written once."""
 
+import functools
+import inspect
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from excite_cli.cli.completion import complete_key
+from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import MESSAGES, OUTPUT, WORK
 from excite_cli.errors import ConfigError
 
@@ -46,12 +50,18 @@ HeldOut = Annotated[
     str | None,
     typer.Option("--held-out", metavar="RUN", help="Run kept out of the fit. Default: the last."),
 ]
+OwnHeldOut = Annotated[
+    bool,
+    typer.Option("--held-out", help="Of the model's own data, use only the held-out part."),
+]
+Link = Annotated[
+    str | None,
+    typer.Option("--link", help="Link that carries the payload. Default: the last one."),
+]
+Motions = Annotated[int | None, typer.Option("--motions", min=1, help="Override sequence.motions.")]
 MotionFile = Annotated[
     Path,
-    typer.Argument(
-        help="A result file, or a motion: {motion_formats}.",
-        show_default=False,
-    ),
+    typer.Argument(help="A result file, or a motion: {motion_formats}.", show_default=False),
 ]
 Output = Annotated[
     Path | None,
@@ -72,20 +82,6 @@ Set = Annotated[
     ),
 ]
 Seed = Annotated[int | None, typer.Option("--seed", min=0, help="Override the config's seed.")]
-Json = Annotated[
-    bool,
-    typer.Option("--json", help="Print the answer as JSON, errors too.", rich_help_panel=MESSAGES),
-]
-Quiet = Annotated[
-    bool,
-    typer.Option("--quiet", "-q", help="Only the answer, and errors.", rich_help_panel=MESSAGES),
-]
-Verbose = Annotated[
-    bool, typer.Option("--verbose", "-v", help="More detail.", rich_help_panel=MESSAGES)
-]
-NoProgress = Annotated[
-    bool, typer.Option("--no-progress", help="No progress line.", rich_help_panel=MESSAGES)
-]
 Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="Replace existing files.", rich_help_panel=OUTPUT)
 ]
@@ -140,3 +136,53 @@ StoredModel = Annotated[
         show_default=False,
     ),
 ]
+
+
+def written(*names: str, **settings: Any) -> Any:
+    """An option that names a file to write."""
+    return typer.Option(None, *names, rich_help_panel=OUTPUT, **settings)
+
+
+_MESSAGES = {
+    "as_json": (["--json"], "Print the answer as JSON, errors too."),
+    "quiet": (["--quiet", "-q"], "Only the answer, and errors."),
+    "verbose": (["--verbose", "-v"], "More detail."),
+    "no_progress": (["--no-progress"], "No progress line."),
+}
+
+
+def with_messages(run: Callable[..., None]) -> Callable[..., None]:
+    """A command with the options of its messages in place of its first parameter, a `Terminal`."""
+
+    @functools.wraps(run)
+    def talking(
+        *, as_json: bool, quiet: bool, verbose: bool, no_progress: bool, **given: Any
+    ) -> None:
+        run(Terminal(as_json, quiet, verbose, not no_progress), **given)
+
+    _, *own = inspect.signature(run).parameters.values()
+    shared = [
+        inspect.Parameter(
+            name,
+            inspect.Parameter.POSITIONAL_OR_KEYWORD,
+            default=typer.Option(False, *names, help=words, rich_help_panel=MESSAGES),
+            annotation=bool,
+        )
+        for name, (names, words) in _MESSAGES.items()
+    ]
+    talking.__signature__ = inspect.Signature([*own, *shared])  # type: ignore[attr-defined]
+    talking.__annotations__ = {each.name: each.annotation for each in [*own, *shared]}
+    return talking
+
+
+def command(run: Callable[..., None]) -> Callable[..., None]:
+    """A command `with_messages` that calculates: in as many threads as `threads` says, else one."""
+
+    @functools.wraps(run)
+    def limited(terminal: Terminal, **given: Any) -> None:
+        from excite_cli.api.working import single_threaded
+
+        with single_threaded(given.get("threads", 1)):
+            run(terminal, **given)
+
+    return with_messages(limited)

@@ -1,7 +1,6 @@
 """`excite replay`: recorded torques, or set points, played on an exported model."""
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
@@ -9,25 +8,18 @@ from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
 
 
+@options.command
 def replay(
+    terminal: Terminal,
     model: options.StoredModel,
     data: options.Data,
-    held_out: Annotated[
-        bool,
-        typer.Option("--held-out", help="Of the model's own data, use only the held-out part."),
-    ] = False,
-    beside: Annotated[
-        Path | None,
-        typer.Option(
-            "--beside",
-            metavar="MODEL",
-            help="Where set points are played: another model of the robot, on the same log.",
-        ),
-    ] = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
-    no_progress: options.NoProgress = False,
+    held_out: options.OwnHeldOut = False,
+    beside: Path | None = typer.Option(
+        None,
+        "--beside",
+        metavar="MODEL",
+        help="Where set points are played: another model of the robot, on the same log.",
+    ),
 ) -> None:
     """Play recorded torques on the model as exported to simulators: does it move as the robot did?
 
@@ -47,9 +39,6 @@ def replay(
     """
     from excite_cli.api.replaying import replay as replay_data
     from excite_cli.api.replaying import replay_answer
-    from excite_cli.api.working import single_threaded
 
-    terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    with single_threaded():
-        found = replay_data(model, data, held_out=held_out, beside=beside, tell=terminal.tell)
+    found = replay_data(model, data, held_out=held_out, beside=beside, tell=terminal.tell)
     terminal.show(replay_answer(found))

@@ -2,13 +2,11 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
-from excite_cli.cli.help_page import OUTPUT
 
 
 class Format(StrEnum):
@@ -19,53 +17,31 @@ class Format(StrEnum):
     pdf = "pdf"
 
 
+@options.command
 def report(
-    files: Annotated[
-        list[Path],
-        typer.Argument(help="Results, fits and diagnoses, in any order.", show_default=False),
-    ],
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            help="The page. Default: <first file>-report.html here.",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = None,
-    figures: Annotated[
-        Path | None,
-        typer.Option(
-            "--figures",
-            metavar="DIR",
-            help="Write figures of motions and diagnoses to this folder, or to NAME.pdf; the page "
-            "only with -o.",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = None,
-    kind: Annotated[
-        Format | None,
-        typer.Option(
-            "--format",
-            help="Format of --figures in a folder. Default: png.",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = None,
-    config: Annotated[
-        Path | None,
-        typer.Option(
-            "--config",
-            help="The YAML file it was made with: a URDF is relative to it.",
-        ),
-    ] = None,
-    picture: Annotated[
-        bool, typer.Option("--picture/--no-picture", help="Show the robot on the page.")
-    ] = True,
+    terminal: Terminal,
+    files: list[Path] = typer.Argument(
+        ..., help="Results, fits and diagnoses, in any order.", show_default=False
+    ),
+    output: Path | None = options.written(
+        "--output", "-o", help="The page. Default: <first file>-report.html here."
+    ),
+    figures: Path | None = options.written(
+        "--figures",
+        metavar="DIR",
+        help="Write figures of motions and diagnoses to this folder, or to NAME.pdf; the "
+        "page only with -o.",
+    ),
+    kind: Format | None = options.written(
+        "--format", help="Format of --figures in a folder. Default: png."
+    ),
+    config: Path | None = typer.Option(
+        None, "--config", help="The YAML file it was made with: a URDF is relative to it."
+    ),
+    picture: bool = typer.Option(
+        True, "--picture/--no-picture", help="Show the robot on the page."
+    ),
     overwrite: options.Overwrite = False,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
-    no_progress: options.NoProgress = False,
 ) -> None:
     """Write a page (HTML, one file, no network) about motions, what was identified and diagnosed.
 
@@ -81,10 +57,8 @@ def report(
       excite report ur10.h5 diagnosis.h5 --figures ur10-figures --format svg
     """
     from excite_cli.api.reporting import report_answer, write_report
-    from excite_cli.api.working import single_threaded
 
-    terminal = Terminal(as_json, quiet, verbose, not no_progress)
-    with single_threaded(), terminal.live("drawing") as line:
+    with terminal.live("drawing") as line:
         found = write_report(
             files,
             output,

@@ -1,7 +1,5 @@
 """`excite robots`: what example-robot-data offers, or the joints and links of one robot."""
 
-from typing import Annotated
-
 import typer
 
 from excite_cli.cli import options
@@ -9,18 +7,14 @@ from excite_cli.cli.completion import complete_robot
 from excite_cli.cli.console import Terminal
 
 
+@options.with_messages
 def robots(
-    robot: Annotated[
-        str | None,
-        typer.Argument(
-            help="A name of the list, or a URDF file, to see its joints.",
-            autocompletion=complete_robot,
-        ),
-    ] = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
-    no_progress: options.NoProgress = False,
+    terminal: Terminal,
+    robot: str | None = typer.Argument(
+        None,
+        help="A name of the list, or a URDF file, to see its joints.",
+        autocompletion=complete_robot,
+    ),
 ) -> None:
     """List the available robots, or the joints of one with their limits.
 
@@ -35,5 +29,4 @@ def robots(
     """
     from excite_cli.api.proposing import describe_robot, list_robots, robot_answer
 
-    terminal = Terminal(as_json, quiet, verbose, not no_progress)
     terminal.show(list_robots() if robot is None else robot_answer(describe_robot(robot)))

@@ -1,25 +1,16 @@
 """`excite schema`: the JSON Schema of the YAML problem, for editors."""
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
-from excite_cli.cli.help_page import OUTPUT
 
 
+@options.with_messages
 def schema(
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", help="Write it to this file.", rich_help_panel=OUTPUT),
-    ] = None,
+    terminal: Terminal,
+    output: Path | None = options.written("--output", "-o", help="Write it to this file."),
     overwrite: options.Overwrite = False,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
-    no_progress: options.NoProgress = False,
 ) -> None:
     """Print the JSON Schema of the config, for completion and checks in editors.
 
@@ -36,5 +27,4 @@ def schema(
     if output is None:
         print(config_schema())
     else:
-        terminal = Terminal(as_json, quiet, verbose, not no_progress)
         terminal.show(save_schema(output, overwrite))

@@ -1,46 +1,31 @@
 """`excite score`: a stored model against new data."""
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
-from excite_cli.cli.help_page import OUTPUT
 
 
+@options.command
 def score(
+    terminal: Terminal,
     model: options.StoredModel,
     data: options.Data,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", help="File for the score (HDF5).", rich_help_panel=OUTPUT),
-    ] = None,
-    held_out: Annotated[
-        bool,
-        typer.Option("--held-out", help="Of the model's own data, use only the held-out part."),
-    ] = False,
-    limits: Annotated[
-        Path | None,
-        typer.Option(
-            "--thresholds",
-            metavar="FILE.json",
-            help="Write thresholds of a collision detector, from these runs.",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = None,
-    false_alarms: Annotated[
-        float,
-        typer.Option("--false-alarms", help="Allowed false alarms per hour."),
-    ] = 1.0,
+    output: Path | None = options.written("--output", "-o", help="File for the score (HDF5)."),
+    held_out: options.OwnHeldOut = False,
+    limits: Path | None = options.written(
+        "--thresholds",
+        metavar="FILE.json",
+        help="Write thresholds of a collision detector, from these runs.",
+    ),
+    false_alarms: float = typer.Option(
+        1.0, "--false-alarms", help="Allowed false alarms per hour."
+    ),
     workers: options.Workers = 1,
     scheduler: options.Scheduler = None,
     overwrite: options.Overwrite = False,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
-    no_progress: options.NoProgress = False,
 ) -> None:
     """Play a stored model on new data: does it still predict the torque, and if not, why?
 
@@ -60,11 +45,9 @@ def score(
     """
     from excite_cli.api.scoring import score as score_data
     from excite_cli.api.scoring import score_answer, thresholds
-    from excite_cli.api.working import single_threaded, working
+    from excite_cli.api.working import working
 
-    terminal = Terminal(as_json, quiet, verbose, not no_progress)
     with (
-        single_threaded(),
         working(workers, scheduler, 1, terminal.tell) as place,
         terminal.live("score", len(data)) as line,
     ):

@@ -1,180 +1,147 @@
 """`excite simulate`: planned motions, played on a robot that differs from its model."""
 
+import math
+from collections.abc import Sequence
+from enum import StrEnum
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from excite_cli.cli import drive, options
+from excite_cli.cli import options
 from excite_cli.cli.completion import complete_effect
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
 from excite_cli.cli.options import start_from
+from excite_cli.errors import ConfigError
 
-_PLAYED, _ROBOT, _MEASURED = "Playback", "Simulated robot", "Recording"
+if TYPE_CHECKING:
+    from excite_cli.api.simulating import PositionDrive
+    from excite_cli.config.spec import Spec
+
+_played = partial(typer.Option, rich_help_panel="Playback")
+_of_robot = partial(typer.Option, rich_help_panel="Simulated robot")
+_recorded = partial(typer.Option, rich_help_panel="Recording")
+_driven = partial(typer.Option, rich_help_panel="Controller")
 
 
+class Control(StrEnum):
+    """What leads the simulated robot."""
+
+    TRACKING = "tracking"
+    POSITION = "position"
+
+
+@options.command
 def simulate(
+    terminal: Terminal,
     config: options.Config,
     file: options.MotionFile,
-    output: Annotated[
-        Path, typer.Option("--output", "-o", help="The data file, HDF5.", rich_help_panel=OUTPUT)
-    ],
-    effect: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--effect",
-            rich_help_panel=_ROBOT,
-            metavar="KIND@JOINT=VALUE",
-            help="Put an effect into the robot (may be repeated); in full: "
-            "KIND@JOINT,…=VALUE,NAME:VALUE,…, then ;runs:RUN|RUN, then ;covariate:COLUMN.",
-            autocompletion=complete_effect,
-        ),
-    ] = None,
-    covariate: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--covariate",
-            rich_help_panel=_MEASURED,
-            metavar="NAME=START",
-            help="A further column that effects may follow (may be repeated); in full: "
-            "NAME=START,end:VALUE,time_constant:SECONDS,noise:SD over the campaign, or "
-            "NAME=FILE.csv with columns t and NAME.",
-        ),
-    ] = None,
-    motion: Annotated[
-        list[int] | None,
-        typer.Option(
-            "--motion",
-            rich_help_panel=_PLAYED,
-            min=1,
-            help="Play this motion only (may be repeated).",
-        ),
-    ] = None,
-    repeat: Annotated[
-        int,
-        typer.Option(
-            "--repeat",
-            rich_help_panel=_PLAYED,
-            min=1,
-            help="Recordings of each motion, with fresh noise.",
-        ),
-    ] = 1,
-    periods: Annotated[
-        int,
-        typer.Option(
-            "--periods",
-            rich_help_panel=_PLAYED,
-            min=1,
-            help="Periods of a motion in each recording.",
-        ),
-    ] = 1,
-    pause: Annotated[
-        float,
-        typer.Option(
-            "--pause",
-            rich_help_panel=_PLAYED,
-            help="Seconds between recordings, which then have absolute stamps.",
-        ),
-    ] = 0.0,
-    entry: Annotated[
-        bool,
-        typer.Option(
-            "--entry",
-            rich_help_panel=_PLAYED,
-            help="Enter each motion from rest at a posture, and go back to it.",
-        ),
-    ] = False,
-    posture: Annotated[
-        str | None,
-        typer.Option(
-            "--from",
-            rich_help_panel=_PLAYED,
-            metavar="JOINT=VALUE,…",
-            help="The posture of --entry [rad, m]; joints not named are at robot.posture.",
-        ),
-    ] = None,
-    rate: Annotated[
-        float, typer.Option("--rate", rich_help_panel=_MEASURED, help="Samples per second [Hz].")
-    ] = 500.0,
-    torque_noise: Annotated[
-        float,
-        typer.Option(
-            "--torque-noise",
-            rich_help_panel=_MEASURED,
-            help="Torque noise as a share of the joint's RMS torque.",
-        ),
-    ] = 0.01,
-    noise_correlation: Annotated[
-        float,
-        typer.Option(
-            "--noise-correlation",
-            rich_help_panel=_MEASURED,
-            help="Correlation of the noise from sample to sample.",
-        ),
-    ] = 0.0,
-    encoder: Annotated[
-        float,
-        typer.Option(
-            "--encoder", rich_help_panel=_MEASURED, help="Resolution of the encoders, in rad (m)."
-        ),
-    ] = 2e-5,
-    wrench_noise: Annotated[
-        str | None,
-        typer.Option(
-            "--wrench-noise",
-            rich_help_panel=_MEASURED,
-            metavar="FORCE,MOMENT",
-            help="Noise of wrenches [N, N·m], where robot.rows has base. Default: 2,0.5.",
-        ),
-    ] = None,
-    imu_noise: Annotated[
-        str | None,
-        typer.Option(
-            "--imu-noise",
-            rich_help_panel=_MEASURED,
-            metavar="ACCELERATION,RATE",
-            help="Noise of the base's inertial unit [m/s², rad/s], where the config declares one. "
-            "Default: 0.02,0.001.",
-        ),
-    ] = None,
-    inertia_error: Annotated[
-        float,
-        typer.Option(
-            "--inertia-error",
-            rich_help_panel=_ROBOT,
-            help="Deviation of the robot's inertias from the URDF; 0: none.",
-        ),
-    ] = 0.2,
-    no_declared: Annotated[
-        bool,
-        typer.Option(
-            "--no-declared",
-            rich_help_panel=_ROBOT,
-            help="Leave out the effects that the config declares.",
-        ),
-    ] = False,
-    torque_limits: Annotated[
-        bool,
-        typer.Option(
-            "--torque-limits",
-            rich_help_panel=_ROBOT,
-            help="Motors saturate at the robot's effort limits.",
-        ),
-    ] = False,
-    control: drive.ControlOption = drive.Control.TRACKING,
-    kp: drive.Kp = None,
-    kd: drive.Kd = None,
-    command_rate: drive.CommandRate = None,
-    command_delay: drive.CommandDelay = None,
-    set_point_speeds: drive.SetPointSpeeds = False,
+    output: Path = typer.Option(
+        ..., "--output", "-o", help="The data file, HDF5.", rich_help_panel=OUTPUT
+    ),
+    effect: list[str] | None = _of_robot(
+        None,
+        "--effect",
+        metavar="KIND@JOINT=VALUE",
+        help="Put an effect into the robot (may be repeated); in full: "
+        "KIND@JOINT,…=VALUE,NAME:VALUE,…, then ;runs:RUN|RUN, then ;covariate:COLUMN.",
+        autocompletion=complete_effect,
+    ),
+    covariate: list[str] | None = _recorded(
+        None,
+        "--covariate",
+        metavar="NAME=START",
+        help="A further column that effects may follow (may be repeated); in full: "
+        "NAME=START,end:VALUE,time_constant:SECONDS,noise:SD over the campaign, or "
+        "NAME=FILE.csv with columns t and NAME.",
+    ),
+    motion: list[int] | None = _played(
+        None, "--motion", min=1, help="Play this motion only (may be repeated)."
+    ),
+    repeat: int = _played(
+        1, "--repeat", min=1, help="Recordings of each motion, with fresh noise."
+    ),
+    periods: int = _played(1, "--periods", min=1, help="Periods of a motion in each recording."),
+    pause: float = _played(
+        0.0, "--pause", help="Seconds between recordings, which then have absolute stamps."
+    ),
+    entry: bool = _played(
+        False, "--entry", help="Enter each motion from rest at a posture, and go back to it."
+    ),
+    posture: str | None = _played(
+        None,
+        "--from",
+        metavar="JOINT=VALUE,…",
+        help="The posture of --entry [rad, m]; joints not named are at robot.posture.",
+    ),
+    rate: float = _recorded(500.0, "--rate", help="Samples per second [Hz]."),
+    torque_noise: float = _recorded(
+        0.01, "--torque-noise", help="Torque noise as a share of the joint's RMS torque."
+    ),
+    noise_correlation: float = _recorded(
+        0.0, "--noise-correlation", help="Correlation of the noise from sample to sample."
+    ),
+    encoder: float = _recorded(2e-05, "--encoder", help="Resolution of the encoders, in rad (m)."),
+    wrench_noise: str | None = _recorded(
+        None,
+        "--wrench-noise",
+        metavar="FORCE,MOMENT",
+        help="Noise of wrenches [N, N·m], where robot.rows has base. Default: 2,0.5.",
+    ),
+    imu_noise: str | None = _recorded(
+        None,
+        "--imu-noise",
+        metavar="ACCELERATION,RATE",
+        help="Noise of the base's inertial unit [m/s², rad/s], where the config declares "
+        "one. Default: 0.02,0.001.",
+    ),
+    inertia_error: float = _of_robot(
+        0.2, "--inertia-error", help="Deviation of the robot's inertias from the URDF; 0: none."
+    ),
+    no_declared: bool = _of_robot(
+        False, "--no-declared", help="Leave out the effects that the config declares."
+    ),
+    torque_limits: bool = _of_robot(
+        False, "--torque-limits", help="Motors saturate at the robot's effort limits."
+    ),
+    control: Control = _driven(
+        Control.TRACKING,
+        "--control",
+        help="tracking: a controller with a model; position: drives that follow set points, whose "
+        "log holds positions and set points, but no torque.",
+    ),
+    kp: list[str] | None = _driven(
+        None,
+        "--kp",
+        metavar="NUMBER|JOINT=NUMBER",
+        help="With --control position: stiffness of the drives [N·m/rad, N/m] (may be repeated).",
+    ),
+    kd: list[str] | None = _driven(
+        None,
+        "--kd",
+        metavar="NUMBER|JOINT=NUMBER",
+        help="With --control position: damping of the drives [N·m·s/rad, N·s/m] (may be repeated).",
+    ),
+    command_rate: float | None = _driven(
+        None,
+        "--command-rate",
+        help="With --control position: set points per second [Hz], held in between. Default: 500.",
+    ),
+    command_delay: float | None = _driven(
+        None,
+        "--command-delay",
+        help="With --control position: seconds from sending a set point until it acts. Default: 0.",
+    ),
+    set_point_speeds: bool = _driven(
+        False,
+        "--set-point-speeds",
+        help="With --control position: send planned speeds too (v_cmd); without, they are 0.",
+    ),
     seed: options.Seed = None,
     overrides: options.Set = None,
     overwrite: options.Overwrite = False,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
-    no_progress: options.NoProgress = False,
 ) -> None:
     """Play motions on a MuJoCo robot and record them as measured data.
 
@@ -204,48 +171,130 @@ def simulate(
     from excite_cli.api.loading import load_case
     from excite_cli.api.simulating import SimulationSettings, parse_series, simulation_answer
     from excite_cli.api.simulating import simulate as simulate_motions
-    from excite_cli.api.working import single_threaded
-    from excite_cli.cli.base_noise import base_noise
 
-    terminal = Terminal(as_json, quiet, verbose, not no_progress)
     start = start_from(posture, entry)
-    with single_threaded():
-        case = load_case(config, overrides or ())
-        settings = SimulationSettings(
-            seed=case.spec.seed if seed is None else seed,
-            rate=rate,
-            torque_noise=torque_noise,
-            noise_correlation=noise_correlation,
-            encoder=encoder,
-            inertia_error=inertia_error,
-            repeat=repeat,
-            periods=periods,
-            pause=pause,
-            torque_limits=torque_limits,
-            covariates=parse_series(covariate or ()),
-            drive=drive.drive_asked_for(
-                control,
-                case.robot.joint_names,
-                kp,
-                kd,
-                command_rate,
-                command_delay,
-                set_point_speeds,
-            ),
-            **base_noise(case.spec, wrench_noise, imu_noise),
+    case = load_case(config, overrides or ())
+    settings = SimulationSettings(
+        seed=case.spec.seed if seed is None else seed,
+        rate=rate,
+        torque_noise=torque_noise,
+        noise_correlation=noise_correlation,
+        encoder=encoder,
+        inertia_error=inertia_error,
+        repeat=repeat,
+        periods=periods,
+        pause=pause,
+        torque_limits=torque_limits,
+        covariates=parse_series(covariate or ()),
+        drive=_drive(
+            control,
+            case.robot.joint_names,
+            kp,
+            kd,
+            command_rate,
+            command_delay,
+            set_point_speeds,
+        ),
+        **_base_noise(case.spec, wrench_noise, imu_noise),
+    )
+    with terminal.live("simulating") as line:
+        found = simulate_motions(
+            case,
+            file,
+            effect or (),
+            settings,
+            chosen=motion or (),
+            start=start,
+            declared=not no_declared,
+            output=output,
+            overwrite=overwrite,
+            progress=line,
+            tell=terminal.tell,
         )
-        with terminal.live("simulating") as line:
-            found = simulate_motions(
-                case,
-                file,
-                effect or (),
-                settings,
-                chosen=motion or (),
-                start=start,
-                declared=not no_declared,
-                output=output,
-                overwrite=overwrite,
-                progress=line,
-                tell=terminal.tell,
-            )
     terminal.show(simulation_answer(found, str(output), settings.seed))
+
+
+def _drive(
+    control: Control,
+    joint_names: Sequence[str],
+    kp: list[str] | None,
+    kd: list[str] | None,
+    command_rate: float | None,
+    command_delay: float | None,
+    set_point_speeds: bool,
+) -> "PositionDrive | None":
+    """The drive that the options describe; None for the tracking controller.
+
+    Raises
+    ------
+    ConfigError
+        Options of drives without --control position, or that without gains; a gain cannot be read.
+    """
+    from excite_cli.api.simulating import PositionDrive, parse_gains
+
+    options = {
+        "--kp": kp, "--kd": kd, "--command-rate": command_rate, "--command-delay": command_delay,
+        "--set-point-speeds": set_point_speeds or None,
+    }  # fmt: skip
+    if control is Control.TRACKING:
+        given = [name for name, value in options.items() if value is not None]
+        if given:
+            raise ConfigError(
+                f"{given[0]}: only drives that follow set points have it. Add --control position."
+            )
+        return None
+    missing = [name for name in ("--kp", "--kd") if not options[name]]
+    if missing:
+        raise ConfigError(
+            f"--control position: {' and '.join(missing)} missing. Give the gains of the drives, "
+            "for all joints (--kp 20 --kd 0.5) or one by one (--kp elbow=40); 0 is a --kd as well."
+        )
+    return PositionDrive(
+        parse_gains("--kp", kp or (), joint_names),
+        parse_gains("--kd", kd or (), joint_names),
+        500.0 if command_rate is None else command_rate,
+        0.0 if command_delay is None else command_delay,
+        set_point_speeds,
+    )
+
+
+def _base_noise(spec: "Spec", wrench: str | None, imu: str | None) -> dict[str, float]:
+    """Standard deviations by their names in the settings; none of options that are not given.
+
+    Raises
+    ------
+    ConfigError
+        A text is not two numbers, or the config declares no such sensor.
+    """
+    found: dict[str, float] = {}
+    stands = "base" in spec.robot.rows
+    if wrench is not None:
+        if not stands:
+            raise ConfigError(
+                "--wrench-noise: no wrench is measured; robot.rows of the config has no 'base'."
+            )
+        force, moment = _pair("--wrench-noise", wrench, "FORCE,MOMENT [N, N·m]", "2,0.5")
+        found |= {"force_noise": force, "moment_noise": moment}
+    if imu is not None:
+        if not stands or spec.measurement.base.imu is None:
+            raise ConfigError(
+                "--imu-noise: no inertial unit is declared; it needs measurement.base.imu, and "
+                "'base' in robot.rows."
+            )
+        form = "ACCELERATION,RATE [m/s², rad/s]"
+        acceleration, rate = _pair("--imu-noise", imu, form, "0.02,0.001")
+        found |= {"acceleration_noise": acceleration, "rate_noise": rate}
+    return found
+
+
+def _pair(option: str, text: str, form: str, example: str) -> tuple[float, float]:
+    try:
+        first, second = map(float, text.split(","))
+    except ValueError:
+        first = second = math.nan
+    if not (0.0 <= first < math.inf and 0.0 <= second < math.inf):
+        raise ConfigError(
+            f"{option}: '{text}' is not {form}, two numbers that are not negative; for example "
+            f"{option} {example}."
+        )
+    return first, second

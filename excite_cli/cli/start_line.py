@@ -11,8 +11,6 @@ from excite_cli.config.spec import Spec
 
 if TYPE_CHECKING:
     from excite_cli.api.planning import Planned, Progress
-if TYPE_CHECKING:
-    from excite_cli.api.planning import Planned, Progress
 
 # The figure of a progress line: where the solver is, and its best within all limits so far.
 

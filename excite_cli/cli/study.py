@@ -1,58 +1,44 @@
 """`excite study`: the same work for many settings and many logs."""
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
-from excite_cli.cli.help_page import OUTPUT
 
 
+@options.command
 def study(
+    terminal: Terminal,
     config: options.Config,
-    logs: Annotated[
-        list[Path] | None,
-        typer.Argument(
-            help="Measured data, a case each: HDF5, CSV, MATLAB, parquet, bags.", show_default=False
-        ),
-    ] = None,
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--vary",
-            metavar="KEY=V1,V2,…",
-            help="Key of the config with the values it takes, or a range 1..8 (may be repeated: "
-            "all combinations).",
-        ),
-    ] = None,
-    identify_only: Annotated[
-        bool, typer.Option("--identify-only", help="Logs are identified, not diagnosed.")
-    ] = False,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output",
-            "-o",
-            metavar="FOLDER",
-            help="Folder for the cases. Default: <config name>_study here.",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = None,
-    resume: Annotated[
-        bool,
-        typer.Option("--resume", help="Skip finished cases; repeat failed ones."),
-    ] = False,
+    logs: list[Path] | None = typer.Argument(
+        None,
+        help="Measured data, a case each: HDF5, CSV, MATLAB, parquet, bags.",
+        show_default=False,
+    ),
+    vary: list[str] | None = typer.Option(
+        None,
+        "--vary",
+        metavar="KEY=V1,V2,…",
+        help="Key of the config with the values it takes, or a range 1..8 (may be repeated: "
+        "all combinations).",
+    ),
+    identify_only: bool = typer.Option(
+        False, "--identify-only", help="Logs are identified, not diagnosed."
+    ),
+    output: Path | None = options.written(
+        "--output",
+        "-o",
+        metavar="FOLDER",
+        help="Folder for the cases. Default: <config name>_study here.",
+    ),
+    resume: bool = typer.Option(False, "--resume", help="Skip finished cases; repeat failed ones."),
     overwrite: options.Overwrite = False,
     overrides: options.Set = None,
     threads: options.Threads = 1,
     workers: options.Workers = 1,
     scheduler: options.Scheduler = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
-    no_progress: options.NoProgress = False,
 ) -> None:
     """Optimise, or identify and diagnose logs, for every combination of settings.
 
@@ -68,12 +54,10 @@ def study(
         --vary identification.method=ols,wls
     """
     from excite_cli.api.studying import StudyNews, run_study, study_answer, study_folder
-    from excite_cli.api.working import single_threaded, working
+    from excite_cli.api.working import working
 
-    terminal = Terminal(as_json, quiet, verbose, not no_progress)
     with (
         working(workers, scheduler, threads, terminal.tell) as place,
-        single_threaded(threads),
         terminal.live("") as line,
     ):
 

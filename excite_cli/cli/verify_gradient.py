@@ -4,15 +4,13 @@ from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
 
 
+@options.command
 def verify_gradient(
+    terminal: Terminal,
     config: options.Config,
     seed: options.Seed = None,
     overrides: options.Set = None,
     threads: options.Threads = 1,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
-    no_progress: options.NoProgress = False,
 ) -> None:
     """Check the gradient of this problem in three ways and time them.
 
@@ -26,12 +24,9 @@ def verify_gradient(
     from excite_cli.api.loading import load_problem
     from excite_cli.api.verifying import gradient_answer
     from excite_cli.api.verifying import verify_gradient as verify
-    from excite_cli.api.working import single_threaded
 
-    terminal = Terminal(as_json, quiet, verbose, not no_progress)
     changes = [*(overrides or []), "constraints.self_collision=null"]
-    with single_threaded(threads):
-        problem = load_problem(config, options.changes(changes, seed=seed), terminal.tell)
-        with terminal.live("differences of every variable"):
-            found = verify(problem)
+    problem = load_problem(config, options.changes(changes, seed=seed), terminal.tell)
+    with terminal.live("differences of every variable"):
+        found = verify(problem)
     terminal.show(gradient_answer(found))

@@ -3,7 +3,6 @@
 import math
 import sys
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
@@ -12,85 +11,65 @@ from excite_cli.cli.console import Terminal
 from excite_cli.errors import ConfigError, FileError
 
 
+@options.command
 def view(
+    terminal: Terminal,
     file: options.MotionFile,
-    motion: Annotated[
-        int | None,
-        typer.Option("--motion", min=1, help="Motion of a result file. Default: all; pictures: 1."),
-    ] = None,
-    config: Annotated[
-        Path | None,
-        typer.Option(
-            "--config", help="The YAML file: for motions without a result file, or a relative URDF."
-        ),
-    ] = None,
+    motion: int | None = typer.Option(
+        None, "--motion", min=1, help="Motion of a result file. Default: all; pictures: 1."
+    ),
+    config: Path | None = typer.Option(
+        None,
+        "--config",
+        help="The YAML file: for motions without a result file, or a relative URDF.",
+    ),
     overrides: options.Set = None,
-    png: Annotated[
-        Path | None, typer.Option("--png", metavar="OUT.png", help="Write one instant as PNG.")
-    ] = None,
-    gif: Annotated[
-        Path | None, typer.Option("--gif", metavar="OUT.gif", help="Write the motion as GIF.")
-    ] = None,
-    time: Annotated[
-        float | None,
-        typer.Option(
-            "--time", min=0.0, help="Instant of the PNG [s]. Default: at the nearest distance."
-        ),
-    ] = None,
-    ghosts: Annotated[
-        int,
-        typer.Option("--ghosts", min=0, max=20, help="Further instants, drawn faintly in the PNG."),
-    ] = 0,
-    size: Annotated[
-        str | None,
-        typer.Option("--size", metavar="WxH", help="Pixels. Default: 1280x960; GIF: 640x480."),
-    ] = None,
-    angles: Annotated[
-        str,
-        typer.Option(
-            "--view",
-            metavar="AZIMUTH,ELEVATION",
-            help="Direction of view [°]; 0,0: along the x axis.",
-        ),
-    ] = "35,18",
-    fps: Annotated[
-        float, typer.Option("--fps", min=1.0, max=50.0, help="Frames per second of the GIF.")
-    ] = 12.0,
-    duration: Annotated[
-        float | None,
-        typer.Option("--duration", min=0.2, max=120.0, help="Length of the GIF [s]. Default: ≤ 5."),
-    ] = None,
-    capsules: Annotated[
-        bool, typer.Option("--capsules/--no-capsules", help="Show the capsules.")
-    ] = True,
-    distance: Annotated[
-        bool, typer.Option("--distance/--no-distance", help="Show the nearest distance.")
-    ] = True,
-    mass: Annotated[
-        bool | None,
-        typer.Option(
-            "--mass/--no-mass", help="Show the centre of mass. Default: if balance is constrained."
-        ),
-    ] = None,
-    caption: Annotated[
-        bool, typer.Option("--caption/--no-caption", help="Captions in pictures.")
-    ] = True,
-    port: Annotated[
-        int, typer.Option("--port", min=1, max=65535, help="Port, or the next free one.")
-    ] = 8080,
-    host: Annotated[
-        str, typer.Option("--host", help="Address to serve at; 0.0.0.0: for the whole network.")
-    ] = "127.0.0.1",
-    browser: Annotated[
-        bool | None,
-        typer.Option("--open/--no-open", help="Open the browser. Default: from a terminal."),
-    ] = None,
+    png: Path | None = typer.Option(
+        None, "--png", metavar="OUT.png", help="Write one instant as PNG."
+    ),
+    gif: Path | None = typer.Option(
+        None, "--gif", metavar="OUT.gif", help="Write the motion as GIF."
+    ),
+    time: float | None = typer.Option(
+        None, "--time", min=0.0, help="Instant of the PNG [s]. Default: at the nearest distance."
+    ),
+    ghosts: int = typer.Option(
+        0, "--ghosts", min=0, max=20, help="Further instants, drawn faintly in the PNG."
+    ),
+    size: str | None = typer.Option(
+        None, "--size", metavar="WxH", help="Pixels. Default: 1280x960; GIF: 640x480."
+    ),
+    angles: str = typer.Option(
+        "35,18",
+        "--view",
+        metavar="AZIMUTH,ELEVATION",
+        help="Direction of view [°]; 0,0: along the x axis.",
+    ),
+    fps: float = typer.Option(
+        12.0, "--fps", min=1.0, max=50.0, help="Frames per second of the GIF."
+    ),
+    duration: float | None = typer.Option(
+        None, "--duration", min=0.2, max=120.0, help="Length of the GIF [s]. Default: ≤ 5."
+    ),
+    capsules: bool = typer.Option(True, "--capsules/--no-capsules", help="Show the capsules."),
+    distance: bool = typer.Option(
+        True, "--distance/--no-distance", help="Show the nearest distance."
+    ),
+    mass: bool | None = typer.Option(
+        None,
+        "--mass/--no-mass",
+        help="Show the centre of mass. Default: if balance is constrained.",
+    ),
+    caption: bool = typer.Option(True, "--caption/--no-caption", help="Captions in pictures."),
+    port: int = typer.Option(8080, "--port", min=1, max=65535, help="Port, or the next free one."),
+    host: str = typer.Option(
+        "127.0.0.1", "--host", help="Address to serve at; 0.0.0.0: for the whole network."
+    ),
+    browser: bool | None = typer.Option(
+        None, "--open/--no-open", help="Open the browser. Default: from a terminal."
+    ),
     overwrite: options.Overwrite = False,
     workers: options.Workers = 1,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-    verbose: options.Verbose = False,
-    no_progress: options.NoProgress = False,
 ) -> None:
     """Play motions on the robot in the browser, or draw them without a display (--png, --gif).
 
@@ -107,49 +86,47 @@ def view(
     """
     from excite_cli.api.showing import Answer
     from excite_cli.api.viewing import Serving, View, draw_motion, drawing_answer, view_motions
-    from excite_cli.api.working import single_threaded, working
+    from excite_cli.api.working import working
 
-    terminal = Terminal(as_json, quiet, verbose, not no_progress)
     target = _target(png, gif)
     azimuth, elevation = _angles(angles)
     chosen = [motion] if motion is not None else []
-    with single_threaded():
-        if target is None:
+    if target is None:
 
-            def ready(url: str, port: int) -> None:
-                words = f"{url}   (Ctrl-C ends it)"
-                terminal.show(Answer((words,), {"url": url, "port": port}))
-                sys.stdout.flush()
+        def ready(url: str, port: int) -> None:
+            words = f"{url}   (Ctrl-C ends it)"
+            terminal.show(Answer((words,), {"url": url, "port": port}))
+            sys.stdout.flush()
 
-            view_motions(
-                file,
-                config,
-                overrides or (),
-                chosen=chosen,
-                serving=Serving(host, port, azimuth, elevation, capsules, distance, mass),
-                browser=sys.stdout.isatty() and not as_json if browser is None else browser,
-                ready=ready,
-                tell=terminal.tell,
-            )
-            return
-        pixels = _size(size or ("1280x960" if png is not None else "640x480"))
-        look = View(pixels, azimuth, elevation, capsules, distance, mass, caption, ghosts)
-        with working(workers, None, 1, terminal.tell) as place, terminal.live("drawing") as line:
-            found = draw_motion(
-                file,
-                target,
-                config,
-                overrides or (),
-                chosen=chosen,
-                look=look,
-                time=time,
-                fps=fps,
-                seconds=duration,
-                overwrite=overwrite,
-                progress=line,
-                workers=place,
-                tell=terminal.tell,
-            )
+        view_motions(
+            file,
+            config,
+            overrides or (),
+            chosen=chosen,
+            serving=Serving(host, port, azimuth, elevation, capsules, distance, mass),
+            browser=sys.stdout.isatty() and not terminal.as_json if browser is None else browser,
+            ready=ready,
+            tell=terminal.tell,
+        )
+        return
+    pixels = _size(size or ("1280x960" if png is not None else "640x480"))
+    look = View(pixels, azimuth, elevation, capsules, distance, mass, caption, ghosts)
+    with working(workers, None, 1, terminal.tell) as place, terminal.live("drawing") as line:
+        found = draw_motion(
+            file,
+            target,
+            config,
+            overrides or (),
+            chosen=chosen,
+            look=look,
+            time=time,
+            fps=fps,
+            seconds=duration,
+            overwrite=overwrite,
+            progress=line,
+            workers=place,
+            tell=terminal.tell,
+        )
     terminal.show(drawing_answer(found))
 
 

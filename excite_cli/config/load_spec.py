@@ -12,8 +12,8 @@ from pydantic import ValidationError
 
 from excite_cli.config.explain import Path as Place
 from excite_cli.config.explain import explain
+from excite_cli.config.plain_yaml import composed, load_strict
 from excite_cli.config.spec import Spec
-from excite_cli.config.strict_yaml import composed, load_strict
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.given_files import require_stored
 

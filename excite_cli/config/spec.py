@@ -28,9 +28,8 @@ from excite_cli.config.section import (
     Section,
     Share,
 )
-from excite_cli.config.task_spec import TaskSpec
-from excite_cli.config.trajectory_spec import FourierSpec, SamplingSpec, TrajectorySpec
-from excite_cli.shown.record import Shown
+from excite_cli.config.trajectory_spec import FourierSpec, SamplingSpec, TaskSpec, TrajectorySpec
+from excite_cli.shown.answer import Shown
 
 # What a YAML file may say about how well the inertias are known before identification.
 

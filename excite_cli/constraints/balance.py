@@ -9,19 +9,20 @@ numerator and mass are linear in φ (`dynamics.least_ratio`).
 """
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from excite_cli.config.constraints_spec import DiscSpec, PolygonSpec
 from excite_cli.constraints.base import Array, Constraint, Indices, Parts
 from excite_cli.constraints.drawing import ConstraintScene, GroundRegion
 from excite_cli.constraints.setting import Setting
-from excite_cli.constraints.support_polygon import Support, support_polygon
-from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.dynamics.least_ratio import Ratios, least_ratios, worst_inertias
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
-from excite_cli.dynamics.whole_robot import drawn_states
+from excite_cli.dynamics.whole_robot import CenterOfMass, drawn_states
+from excite_cli.errors import ConfigError
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.enclosed_rows import combined, least_of, mass_rows
 from excite_cli.robot.model import Robot
@@ -159,3 +160,48 @@ class Balance(Constraint):
     @property
     def _least_mass(self) -> float:
         return _LIGHTEST * self._mass.total_mass
+
+
+# A convex region of the ground as half-planes normal·x ≤ offset.
+
+
+@dataclass(frozen=True)
+class Support:
+    """`normals` (m, 2) of unit length, outwards; `offsets` (m,) [m]; `center` (2,) within [m]."""
+
+    normals: Array
+    offsets: Array
+    center: Array
+
+    @property
+    def scale(self) -> Array:
+        """Distance (m,) [m] of the centre from each edge."""
+        return np.asarray(self.offsets - self.normals @ self.center)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Every edge by the direction that it lies in."""
+        degrees = np.degrees(np.arctan2(self.normals[:, 1], self.normals[:, 0])) % 360
+        return tuple(f"towards {angle:.0f}°" for angle in degrees)
+
+
+def support_polygon(vertices: Array, margin: float, where: str) -> Support:
+    """Convex hull of `vertices` (k, 2), shrunk by `margin` [m] at every edge.
+
+    `where`: the section of the config, for messages.
+
+    Raises
+    ------
+    ConfigError
+        The vertices lie on a line, or nothing is left inside the margin.
+    """
+    try:
+        hull = ConvexHull(vertices)
+    except QhullError as error:
+        raise ConfigError(f"{where}.vertices: all points lie on a line.") from error
+    edges = np.unique(hull.equations.round(12), axis=0)
+    offsets = -edges[:, 2] - margin
+    center = vertices[hull.vertices].mean(axis=0)
+    if np.any(offsets - edges[:, :2] @ center <= 0):
+        raise ConfigError(f"{where}: a margin of {margin:g} m leaves nothing of the polygon.")
+    return Support(edges[:, :2], offsets, center)

@@ -19,10 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.config.constraints_spec import ContactSpec
+from excite_cli.constraints.balance import Support, support_polygon
 from excite_cli.constraints.base import Array, Constraint, Indices, Parts
 from excite_cli.constraints.drawing import ConstraintScene, GroundRegion
 from excite_cli.constraints.setting import Setting
-from excite_cli.constraints.support_polygon import Support, support_polygon
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.dynamics.least_ratio import Ratios, least_ratios, least_values, worst_inertias
 from excite_cli.dynamics.row_adjoint import RowAdjoint

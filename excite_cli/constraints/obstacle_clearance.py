@@ -10,15 +10,17 @@ from excite_cli.constraints.drawing import ConstraintScene, NearestBodies
 from excite_cli.constraints.nearest_bodies import nearest_obstacles
 from excite_cli.constraints.setting import Setting
 from excite_cli.dynamics.forward_kinematics import States
-from excite_cli.geometry.coal_distances import CoalDistances
 from excite_cli.geometry.link_meshes import Poses
-from excite_cli.geometry.obstacle_distances import ObstacleDistances
-from excite_cli.geometry.obstacle_pairs import ObstaclePairs, choose_obstacle_pairs
+from excite_cli.geometry.mesh_distances import CoalDistances
+from excite_cli.geometry.obstacle_pairs import (
+    ObstacleDistances,
+    ObstaclePairs,
+    choose_obstacle_pairs,
+)
 from excite_cli.geometry.obstacles import Box, Obstacle, build_obstacles
 from excite_cli.geometry.reasons import DroppedPair, Why, counted_reasons, reason_in_words
-from excite_cli.proof.enclosed_distances import EnclosedCapsules
+from excite_cli.proof.enclosed_distances import EnclosedCapsules, least_clearances
 from excite_cli.proof.enclosed_motion import EnclosedMotion
-from excite_cli.proof.enclosed_obstacles import least_clearances
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
 from excite_cli.shown.note import Level, Note

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from excite_cli.config.constraints_spec import ConstraintsSpec, SelfCollisionSpec
-from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
+from excite_cli.dynamics.whole_robot import CenterOfMass
 from excite_cli.geometry.capsules import fit_capsules
 from excite_cli.geometry.obstacle_pairs import ignored_pairs
 from excite_cli.robot.capsule import Capsule

@@ -1,7 +1,7 @@
 """I-optimality (V-optimality): the standard deviation of predicted torques.
 
 Over random states within the limits, for noise of one: ½ log Σ σ_k⁻², of singular values of columns
-that are combined so that this is the mean variance (`excitation/reference_states.py`). It does not
+that are combined so that this is the mean variance (`excitation/weighting.py`). It does not
 depend on which columns are called base parameters.
 """
 

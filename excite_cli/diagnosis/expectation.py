@@ -9,11 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.diagnosis.power import EffectPower, power_of, sizes_shown
-from excite_cli.excitation.objective import Objective
-from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.objective import Objective, Stack
+from excite_cli.excitation.problem import Problem, predicting
 from excite_cli.excitation.result import Result
-from excite_cli.excitation.stack import Stack
-from excite_cli.excitation.with_prediction import predicting
 from excite_cli.robot.model import Array
 
 _FINER = 10  # instants in the time of a sample

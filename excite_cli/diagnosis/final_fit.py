@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.diagnosis.search_result import SearchResult
-from excite_cli.effects.rare_sizes import half_of
+from excite_cli.effects.judgement import half_of
 from excite_cli.identification.factors import Mask
 from excite_cli.identification.fit import usual_sizes
 from excite_cli.identification.least_squares import LinearFit, fit_rows

@@ -15,12 +15,10 @@ from excite_cli.diagnosis.expectation import Expectation, expectation
 from excite_cli.diagnosis.power import EffectPower, least_sizes, price, times_named
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import ConfigError
-from excite_cli.excitation.free_design import FreeDesign
-from excite_cli.excitation.invariant import Invariants, design_for, invariants
-from excite_cli.excitation.problem import Problem
+from excite_cli.excitation.invariant import FreeDesign, Invariants, design_for, invariants
+from excite_cli.excitation.objective import Stack
+from excite_cli.excitation.problem import Problem, predicting
 from excite_cli.excitation.result import Result
-from excite_cli.excitation.stack import Stack
-from excite_cli.excitation.with_prediction import predicting
 
 # Beyond this condition number the information cannot be inverted: nothing is precise yet.
 _SINGULAR = 1e7

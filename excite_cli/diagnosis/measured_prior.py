@@ -3,9 +3,8 @@
 import numpy as np
 
 from excite_cli.errors import ConfigError, FileError
-from excite_cli.excitation.objective import Objective
+from excite_cli.excitation.objective import Objective, Stack
 from excite_cli.excitation.problem import Problem
-from excite_cli.excitation.stack import Stack
 from excite_cli.identification.prepare import PreparedRun, prepare_all
 from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.dataset import Array, Dataset

@@ -7,7 +7,7 @@ import numpy as np
 
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.dynamics.base_parameters import BaseParameters
-from excite_cli.dynamics.inertial_prior import InertialPrior, inertial_prior
+from excite_cli.dynamics.pseudo_inertia import InertialPrior, inertial_prior
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals

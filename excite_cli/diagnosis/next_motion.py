@@ -23,14 +23,12 @@ from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.uncertain_inertias import FitKnowledge
 from excite_cli.errors import FileError
 from excite_cli.excitation.discrimination import SEPARATED, divergences, motions_needed
-from excite_cli.excitation.extension import in_words, why_not_planned
-from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.excitation.stack import Stack
-from excite_cli.excitation.with_prediction import predicting
+from excite_cli.excitation.effect_columns import in_words, why_not_planned
+from excite_cli.excitation.objective import Stack
+from excite_cli.excitation.problem import Problem, build_problem, predicting
 from excite_cli.robot.base_joints import BASE_ROWS
 from excite_cli.robot.model import Array, Robot, build_measured_robot
-from excite_cli.shown.answer import Command, as_word
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Command, Shown, as_word
 
 
 @dataclass(frozen=True, repr=False)

@@ -26,8 +26,8 @@ from scipy.stats import chi2, norm
 from excite_cli.diagnosis import rules
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION, catalogue
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.prediction import Prediction
-from excite_cli.excitation.stack import Stack
 
 SURE = 0.95
 # χ² of columns that are shifted in time exceeds that of chance by this factor: the median of the

@@ -18,7 +18,7 @@ from excite_cli.measurement.campaign_clock import Recorded
 from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.model import Array
 from excite_cli.robot.tree import Skeleton
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 
 
 @dataclass(frozen=True)

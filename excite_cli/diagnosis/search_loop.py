@@ -35,7 +35,7 @@ from excite_cli.diagnosis.textbook import everyday, textbook_effects
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.diagnosis.weighted_fit import WeightedFit
-from excite_cli.dynamics.inertial_prior import InertialPrior
+from excite_cli.dynamics.pseudo_inertia import InertialPrior
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import scales

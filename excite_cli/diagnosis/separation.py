@@ -13,10 +13,9 @@ from excite_cli.diagnosis.records import Diagnosis, EffectRecord
 from excite_cli.effects.base import Effect
 from excite_cli.errors import FileError
 from excite_cli.excitation.discrimination import Direction, Separation, divergences
-from excite_cli.excitation.effect_columns import column_names
-from excite_cli.excitation.extension import extend, in_words, why_not_planned
+from excite_cli.excitation.effect_columns import column_names, extend, in_words, why_not_planned
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem, on_fine_grid
-from excite_cli.excitation.stack import Stack
 from excite_cli.robot.model import Array, Robot
 
 # Width of the sign of a speed on the fine grid of a separation [rad/s].

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint, motion_cross
-from excite_cli.robot.carried_bodies import carried_bodies
+from excite_cli.robot.link_frame import carried_bodies
 from excite_cli.robot.model import Array, Robot
 
 Indices = NDArray[np.intp]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
-from excite_cli.effects.c_code import real
+from excite_cli.effects.mechanism import real
 from excite_cli.robot.model import Array
 
 

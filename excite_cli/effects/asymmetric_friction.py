@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals, Tier
-from excite_cli.effects.c_code import real
+from excite_cli.effects.mechanism import real
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.robot.model import Array
 

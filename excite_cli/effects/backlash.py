@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
 from excite_cli.effects.base import Effect, Parameter, Signals, Tier, steps_by_ratio
-from excite_cli.effects.c_code import real
+from excite_cli.effects.mechanism import real
 from excite_cli.effects.parameter import whole_share
 from excite_cli.effects.simulated_robot import SimulatedRobot, Transmission, rotor_inertia
 from excite_cli.robot.model import Array, Robot

@@ -15,8 +15,7 @@ import numpy as np
 
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Scope, Signals
-from excite_cli.effects.c_code import all_joints, reals
-from excite_cli.effects.mjcf_parts import MjcfParts
+from excite_cli.effects.mechanism import MjcfParts, all_joints, reals
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 

@@ -20,8 +20,8 @@ from excite_cli.effects.base import (
     Tier,
     steps_by_ratio,
 )
-from excite_cli.effects.c_code import all_joints, real, reals
 from excite_cli.effects.judgement import Seen
+from excite_cli.effects.mechanism import all_joints, real, reals
 from excite_cli.effects.simulated_robot import Push, SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 

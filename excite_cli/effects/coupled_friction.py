@@ -18,8 +18,7 @@ from typing import ClassVar
 import numpy as np
 
 from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Scope, Signals
-from excite_cli.effects.c_code import real
-from excite_cli.effects.mjcf_parts import MjcfParts, Tendon
+from excite_cli.effects.mechanism import MjcfParts, Tendon, real
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.effects.simulated_robot import DryCoupling, SimulatedRobot
 from excite_cli.robot.model import Array, Robot

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from excite_cli.effects.base import Abscissa, Cotangents, Parameter, Signals
-from excite_cli.effects.c_code import real
+from excite_cli.effects.mechanism import real
 from excite_cli.effects.of_covariate import PER_UNIT, OfCovariate
 from excite_cli.robot.model import Array
 

@@ -39,7 +39,7 @@ from excite_cli.effects.base import (
     Value,
     steps_by_ratio,
 )
-from excite_cli.effects.c_code import real
+from excite_cli.effects.mechanism import real
 from excite_cli.effects.sign import WIDTH, sign_width, smooth_sign, smooth_sign_slope
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array, Robot

@@ -14,9 +14,9 @@ from typing import ClassVar
 import numpy as np
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals, Tier, Value
-from excite_cli.effects.c_code import all_joints, real
 from excite_cli.effects.directional import slope_of_gradient
 from excite_cli.effects.judgement import Seen
+from excite_cli.effects.mechanism import all_joints, real
 from excite_cli.effects.simulated_robot import SimulatedRobot, Transmission, rotor_inertia
 from excite_cli.robot.model import Array
 

@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
-from excite_cli.effects.c_code import all_joints, real
 from excite_cli.effects.directional import slope_of_gradient
+from excite_cli.effects.mechanism import all_joints, real
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array
 

@@ -11,8 +11,8 @@ from typing import ClassVar
 import numpy as np
 
 from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Signals, Tier
-from excite_cli.effects.c_code import real
-from excite_cli.effects.rare_sizes import half_of, nearest_of_sign
+from excite_cli.effects.judgement import half_of, nearest_of_sign
+from excite_cli.effects.mechanism import real
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.robot.model import Array
 

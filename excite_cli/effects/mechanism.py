@@ -1,8 +1,9 @@
-"""How an effect gets into a simulated robot and into files of models: by default, its formula."""
+"""How an effect gets into a simulated robot and into files of models, MJCF and C."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, cast
 
 import numpy as np
@@ -11,7 +12,6 @@ from excite_cli.effects.simulated_robot import JOINT_PARTS
 
 if TYPE_CHECKING:
     from excite_cli.effects.base import Effect
-    from excite_cli.effects.mjcf_parts import MjcfParts
     from excite_cli.effects.parameter import Parameter
     from excite_cli.effects.simulated_robot import SimulatedRobot
     from excite_cli.robot.model import Array
@@ -91,3 +91,75 @@ class Mechanism:
     def put_into_mjcf(self, parts: MjcfParts, values: Array) -> bool:
         """Add it to a MuJoCo model; false if that cannot hold it."""
         return len(self.joints) == 1 and parts.add(self.joints[0], self.mjcf(values))
+
+
+# Parts of a MuJoCo model that effects become: attributes of joints, tendons, gravity.
+
+# Attributes of a joint that add up; `damping_2`, `damping_3` belong to v|v| and v³.
+ADDED = ("damping", "damping_2", "damping_3", "frictionloss", "armature")
+
+
+@dataclass(frozen=True)
+class Tendon:
+    """A tendon of the length q_first + ratio q_second, with `friction` [N·m] and `damping`."""
+
+    first: int
+    second: int
+    ratio: float
+    friction: float
+    damping: float
+
+
+@dataclass
+class MjcfParts:
+    """`joints`: attributes of every <joint>; `tendons`; `gravity` (3,) [m/s²].
+
+    `polynomials`: whether MuJoCo's damping may be a polynomial of the speed (from version 4 on).
+    """
+
+    joints: list[dict[str, float]]
+    gravity: Array
+    polynomials: bool = False
+    tendons: list[Tendon] = field(default_factory=list)
+
+    def add(self, joint: int, found: dict[str, float]) -> bool:
+        """Add attributes; false if they cannot be, beside those that are there."""
+        own = self.joints[joint]
+        powers = any(name in found for name in ("damping_2", "damping_3"))
+        if not found or (powers and not self.polynomials):
+            return False
+        if any(name in own and name not in ADDED for name in found):
+            return False
+        if any(found[name] < 0 for name in ADDED if name in found):
+            return False
+        for name, value in found.items():
+            own[name] = own.get(name, 0.0) + value if name in ADDED else value
+        return True
+
+
+# What the C code of effects is written with: numbers, and the names that stand for the state.
+#
+# In the code of an effect `q`, `v`, `a` are the state, `s` the smoothed signs of the speeds,
+# `load` the torque that the gears carry, `torque` all of the robot's, `tau` what the code adds
+# to, each with an entry per joint; `t` and `start` are times in the recording and on the
+# campaign's clock, `column` further columns of the log, `load_rate`, `load_bend` and
+# `torque_rate` the first and second rates of those torques, `memory` what effects remember
+# (`memory->since` is the time from the last instant to this one); it is kept only where all of an
+# instant is finite. `slopes(q, v, a, j, x, y, z, out)` gives x ∂τ/∂q_j + y ∂τ/∂v_j + z ∂τ/∂a_j of
+# the rigid bodies, `tilted(roll, pitch, q, out)` what a turned base adds, `pushed(f, q, out)`
+# what a force at the tip does; the template says how.
+
+
+def real(x: float) -> str:
+    """A number with all its digits."""
+    return f"R({float(x)!r})"
+
+
+def reals(x: Array) -> str:
+    """Numbers with commas between them."""
+    return ", ".join(real(each) for each in np.ravel(x))
+
+
+def all_joints(call: str) -> str:
+    """`call` fills `out` (EXCITE_JOINTS); it is added to the torque of all joints."""
+    return f"{{ real out[N]; {call}; for (int i = 0; i < N; ++i) tau[i] += out[i]; }}"

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals, Value
-from excite_cli.effects.c_code import real
+from excite_cli.effects.mechanism import real
 from excite_cli.effects.sign import sign_width
 from excite_cli.robot.model import Array, Robot
 

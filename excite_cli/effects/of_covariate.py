@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from excite_cli.effects.base import Effect, Parameter, Signals, Value
-from excite_cli.effects.c_code import real
+from excite_cli.effects.mechanism import real
 from excite_cli.robot.model import Array, Robot
 
 PER_UNIT = "/unit"

@@ -13,8 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from excite_cli.dynamics.nearest_inertias import nearest_inertias
-from excite_cli.dynamics.pseudo_inertia import moved, smallest_eigenvalues
+from excite_cli.dynamics.pseudo_inertia import moved, nearest_inertias, smallest_eigenvalues
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
 from excite_cli.effects.base import (
     Cotangents,
@@ -25,8 +24,7 @@ from excite_cli.effects.base import (
     Value,
     deviation,
 )
-from excite_cli.effects.judgement import Seen
-from excite_cli.effects.rare_sizes import half_of
+from excite_cli.effects.judgement import Seen, half_of
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.link_frame import LinkFrame, leaves
 from excite_cli.robot.model import Array, Robot

@@ -13,8 +13,8 @@ import numpy as np
 
 from excite_cli.effects.angle_curve import hats_over_angle
 from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Signals, Value
-from excite_cli.effects.c_code import real
 from excite_cli.effects.judgement import Seen
+from excite_cli.effects.mechanism import real
 from excite_cli.effects.sign import smooth_sign, smooth_sign_slope
 from excite_cli.robot.model import Array, Robot
 

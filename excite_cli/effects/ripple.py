@@ -29,7 +29,7 @@ from excite_cli.effects.base import (
     Value,
     deviation,
 )
-from excite_cli.effects.c_code import real
+from excite_cli.effects.mechanism import real
 from excite_cli.robot.model import Array, Robot
 
 _CYCLES = 1.0  # least number of periods within the travelled range

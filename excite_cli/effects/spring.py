@@ -7,7 +7,7 @@ import numpy as np
 
 from excite_cli.effects.angle_curve import powers_of_angle
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals, Value, deviation
-from excite_cli.effects.c_code import real
+from excite_cli.effects.mechanism import real
 from excite_cli.robot.model import Array
 
 

@@ -10,8 +10,8 @@ from typing import ClassVar
 import numpy as np
 
 from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Scope, Signals
-from excite_cli.effects.c_code import real
 from excite_cli.effects.judgement import Seen
+from excite_cli.effects.mechanism import real
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.link_frame import branches
 from excite_cli.robot.model import Array, Robot

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from excite_cli.effects.base import Cotangents, Effect, Parameter, Signals
-from excite_cli.effects.c_code import real
+from excite_cli.effects.mechanism import real
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array
 

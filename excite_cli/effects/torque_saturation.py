@@ -17,7 +17,7 @@ from excite_cli.effects.base import (
     Tier,
     steps_by_ratio,
 )
-from excite_cli.effects.c_code import real
+from excite_cli.effects.mechanism import real
 from excite_cli.effects.parameter import whole_share
 from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array, Robot

@@ -26,9 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve
 
-from excite_cli.excitation.objective import Objective, Spectrum
+from excite_cli.excitation.objective import Objective, Spectrum, Stack
 from excite_cli.excitation.progress import Figure, ProgressMeasure
-from excite_cli.excitation.stack import Stack
 from excite_cli.robot.model import Array
 
 # Divergence from which two effects count as told apart.

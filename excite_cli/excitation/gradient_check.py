@@ -15,12 +15,12 @@ from functools import partial
 import numpy as np
 
 from excite_cli.dynamics.block_form import block_pull_back
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
-from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import random_direction
 from excite_cli.excitation.task import MotionTask
 from excite_cli.robot.model import Array
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 
 # The finite-difference checker for every derivative in the program.
 

@@ -10,17 +10,106 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from excite_cli.config.spec import Spec
 from excite_cli.constraints.base import Array, Constraint
 from excite_cli.constraints.joint_columns import Quantity
+from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.admissible import CONTROLLER_RATE
-from excite_cli.excitation.mesh_verdict import MeshVerdict, mesh_verdict
 from excite_cli.excitation.motion import Doubt
 from excite_cli.excitation.problem import Problem
-from excite_cli.geometry.mesh_check import MeshCheck
-from excite_cli.proof.certificate import Path, ProofVerdict, Worst, certify
-from excite_cli.shown.record import Shown
+from excite_cli.geometry.mesh_check import MeshCheck, MeshGap, MeshGaps
+from excite_cli.geometry.reasons import ContactMeaning
+from excite_cli.proof.certificate import Path, ProofVerdict, State, Worst, certify
+from excite_cli.proof.enclosed_motion import Intervals, enclosed_states, intervals_of
+from excite_cli.robot.model import links_by_joint
+from excite_cli.shown.answer import Shown
+
+# Whether the true collision meshes stay apart between the instants, too.
+#
+# Enclosed positions say how far each joint may be from the middle of an interval. Meshes that are
+# farther apart in the middle than their links can approach each other by that stay apart
+# throughout; elsewhere the interval is cut in two.
+
+Mask = NDArray[np.bool_]
+
+_WIDTH = 0.02  # [s]
+_CUTS = 10
+_MOST_OPEN = 2000
+_INTERVALS_AT_ONCE = 200
+
+
+@dataclass(frozen=True)
+class MeshVerdict:
+    """What is known of the meshes along a motion; `times` (T,) are the instants of `gaps`."""
+
+    state: State
+    reason: str
+    gaps: MeshGaps
+    times: Array
+
+    @property
+    def proved(self) -> bool:
+        """Whether no judged pair touches at any instant."""
+        return self.state == "proved"
+
+    def worst(self) -> Worst:
+        """The nearest judged pair; a bound for all where none came near."""
+        judged = [gap for gap in self.gaps.near if gap.standing is ContactMeaning.JUDGED]
+        if not judged:
+            return Worst(self.gaps.beyond, "m", "all pairs farther", float(self.times[0]), 0)
+        nearest = judged[0]
+        broken = sum(gap.touching for gap in judged)
+        distance = -1e-9 if nearest.touching and nearest.distance >= 0 else nearest.distance
+        words = f"{nearest.first} – {nearest.second}"
+        return Worst(distance, "m", words, float(self.times[nearest.index]), broken, distance)
+
+    @property
+    def told(self) -> tuple[MeshGap, ...]:
+        """Pairs that touch and are not judged, with the reason in `standing`."""
+        return tuple(
+            gap
+            for gap in self.gaps.near
+            if gap.standing is not ContactMeaning.JUDGED and gap.touching
+        )
+
+
+def mesh_verdict(path: Path, check: MeshCheck, times: Array) -> MeshVerdict:
+    """Meshes at `times` (T,) [s], and between them."""
+    gaps = check.least(path.states_at(times).q)
+    if gaps.broken:
+        return MeshVerdict("broken", "meshes touch", gaps, times)
+    pending = intervals_of(path.trajectory, _WIDTH)
+    asked = np.ones((len(pending), len(check.judged)), dtype=bool)
+    for _ in range(_CUTS):
+        pending, asked, broken = _open(path, check, pending, asked)
+        if broken:
+            return MeshVerdict("broken", "meshes touch between the instants", gaps, times)
+        if not len(pending):
+            return MeshVerdict("proved", "", gaps, times)
+        if len(pending) > _MOST_OPEN:
+            break
+        pending, asked = pending.halved(), np.tile(asked, (2, 1))
+    reason = "the meshes come too near to each other for a proof between the instants"
+    return MeshVerdict("sampled", reason, gaps, times)
+
+
+def _open(
+    path: Path, check: MeshCheck, intervals: Intervals, asked: Mask
+) -> tuple[Intervals, Mask, bool]:
+    """Intervals with pairs that are not proved apart, which pairs, and whether any touch."""
+    left, broken = np.zeros_like(asked), False
+    for begin in range(0, len(intervals), _INTERVALS_AT_ONCE):
+        some = slice(begin, begin + _INTERVALS_AT_ONCE)
+        q = enclosed_states(path.trajectory, path.coefficients, intervals.only(some)).q
+        proof = check.proved(q.center, change=q.reach, asked=asked[some])
+        left[some] = asked[some] & ~proof.proved
+        broken |= bool(proof.broken.any())
+    again = np.asarray(left.any(axis=1))
+    return intervals.only(again), left[again], broken
+
 
 # Margins of a motion by a second computation, which shares nothing with the first.
 #
@@ -323,3 +412,60 @@ class Inspections(Shown, Mapping[str, Inspection]):
     def violations(self) -> int:
         """Those of all motions."""
         return sum(map(self.violations_of, self.motions))
+
+
+# What no constraint of a problem knows of: what a verdict on its motions does not speak of.
+
+_LISTED = 4
+
+
+def not_modelled(problem: Problem) -> tuple[str, ...]:
+    """Things that a motion of `problem` may hit, by name, the most obvious first."""
+    return not_in_config(
+        problem.spec, [*links_without_shapes(problem), *bodies_without_shapes(problem)]
+    )
+
+
+def not_in_config(spec: Spec, bare: Sequence[str]) -> tuple[str, ...]:
+    """The same of a config alone; `bare`: its links or joints that have no shapes."""
+    asked, found = spec.constraints, []
+    around = asked.surroundings
+    if around is None:
+        found.append("the floor and all else around the robot (constraints.surroundings)")
+    elif around.floor is None and spec.robot.base == "fixed":
+        found.append("the floor (constraints.surroundings.floor)")
+    elif not around.boxes and not around.walls:
+        found.append("all around the robot but the floor (constraints.surroundings)")
+    if asked.self_collision is None:
+        found.append("the robot's own links (constraints.self_collision)")
+    if bare:
+        more = f" and {len(bare) - _LISTED} more" if len(bare) > _LISTED else ""
+        found.append(f"bodies without shapes: {', '.join(bare[:_LISTED])}{more}")
+    return (*found, "cables, hoses and tools that are not in the URDF")
+
+
+def links_without_shapes(problem: Problem) -> list[str]:
+    """Links of `without_shapes` that have none indeed."""
+    own, guarded = problem.spec.constraints.self_collision, _guarded(problem)
+    if own is None or guarded is None:
+        return []
+    return [link for link in own.without_shapes if link not in guarded]
+
+
+def bodies_without_shapes(problem: Problem) -> list[str]:
+    """Moved joints whose bodies have mass and no shape, where self-collision is asked for."""
+    guarded = _guarded(problem)
+    if guarded is None:
+        return []
+    model, links = problem.robot.model, links_by_joint(problem.robot)
+    return [
+        joint
+        for joint in problem.robot.tree.joint_names
+        if model.inertias[model.getJointId(joint)].mass > 0 and not guarded & set(links[joint])
+    ]
+
+
+def _guarded(problem: Problem) -> set[str] | None:
+    """Links that capsules keep apart; None where self-collision is not asked for."""
+    capsules = [c.capsules for c in problem.constraints if isinstance(c, SelfCollision)]
+    return {link for of in capsules for one in of for link in one.links} if capsules else None

@@ -12,7 +12,7 @@ import numpy as np
 from excite_cli.constraints.base import Array
 from excite_cli.excitation.progress import Status
 from excite_cli.proof.certificate import Worst
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 
 # Why what a result says of a motion may not hold for it.
 

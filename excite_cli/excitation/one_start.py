@@ -12,10 +12,10 @@ from excite_cli.constraints.base import Array
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.admissible import lacking_margins
 from excite_cli.excitation.motion import Outcome
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Figure, ProgressCallback, Status
 from excite_cli.excitation.solvers.base import CutShortError, Effort, Solver
-from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import Start, random_start
 from excite_cli.excitation.task import MotionTask
 

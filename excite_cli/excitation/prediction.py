@@ -3,7 +3,7 @@
 Unknown are the base parameters φ_B (r,), and parameters β (k,) of effects: those that are declared,
 and those that a robot may have. Before any motion, with noise σ_j of the torque of row j,
 
-    φ_B ~ N(φ_URDF, X Σ Xᵀ),    Σ = diag (0.3 · scale)² (`dynamics/inertial_prior.py`),
+    φ_B ~ N(φ_URDF, X Σ Xᵀ),    Σ = diag (0.3 · scale)² (`dynamics/pseudo_inertia.py`),
     β_p ~ N(0, s_p²),           s_p such that the effect has a share of its joint's usual torque.
 
 In units of these deviations z the columns are C = diag(1/σ) [Y_B D, columns · s], and after motions
@@ -31,19 +31,17 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, cho_factor, cho_solve
 
 from excite_cli.config.spec import Spec
-from excite_cli.config.task_spec import TaskSpec
+from excite_cli.config.trajectory_spec import TaskSpec
 from excite_cli.criteria.base import condition_number, singular_values
 from excite_cli.dynamics.base_parameters import BaseParameters
-from excite_cli.dynamics.inertial_prior import UNSURE, inertial_prior
+from excite_cli.dynamics.pseudo_inertia import UNSURE, inertial_prior
 from excite_cli.dynamics.regressor import Regressor, standard_parameters
 from excite_cli.effects.base import Effect, Tier
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION, catalogue, kind_named, shows
 from excite_cli.errors import ConfigError, nearest
-from excite_cli.excitation.extension import Extension, extend, why_not_planned
-from excite_cli.excitation.objective import Objective, Spectrum
-from excite_cli.excitation.reference_states import state_bounds
-from excite_cli.excitation.stack import Stack
-from excite_cli.excitation.weighting import Weighting
+from excite_cli.excitation.effect_columns import Extension, extend, why_not_planned
+from excite_cli.excitation.objective import Objective, Spectrum, Stack
+from excite_cli.excitation.weighting import Weighting, state_bounds
 from excite_cli.robot.model import Array, Robot
 
 # Share of a joint's usual torque that an effect may well have: of what every robot has, and of the

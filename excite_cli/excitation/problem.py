@@ -27,18 +27,20 @@ from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.boundary import Boundary, build_boundary
 from excite_cli.excitation.discrimination import Discrimination, Separation
-from excite_cli.excitation.extension import Extension, extend
-from excite_cli.excitation.objective import Objective
+from excite_cli.excitation.effect_columns import Extension, extend
+from excite_cli.excitation.objective import Objective, Stack
 from excite_cli.excitation.prediction import PredictedTorques, Prediction, build_prediction
-from excite_cli.excitation.reference_states import reference_rows, torque_metric
-from excite_cli.excitation.stack import Stack
-from excite_cli.excitation.weighting import Weighting, build_weighting
+from excite_cli.excitation.weighting import (
+    Weighting,
+    build_weighting,
+    reference_rows,
+    torque_metric,
+)
 from excite_cli.robot.mesh_paths import without_unusable
 from excite_cli.robot.model import Robot, build_robot
-from excite_cli.shown.record import Shown
-from excite_cli.trajectory.base import Basis, Trajectory
+from excite_cli.shown.answer import Shown
+from excite_cli.trajectory.base import Basis, Trajectory, with_freedom
 from excite_cli.trajectory.catalogue import build_trajectory
-from excite_cli.trajectory.freedom import with_freedom
 
 # Instants of the cost and of the constraints, filled in from the trajectory where not given.
 
@@ -334,3 +336,37 @@ def with_cost_on(problem: Problem, fine: Basis) -> Problem:
         row_name=weighting.row_name if weighting.row_name != "none" else "even",
     )
     return replace(problem, cost_basis=fine, weighting=weighted)
+
+
+def predicting(
+    problem: Problem, kinds: Sequence[str] = (), possible: Sequence[Effect] | None = None
+) -> Problem:
+    """The problem with its prediction, in which these kinds of effects are possible, too.
+
+    Made for another criterion, or without one of them, it gets a prediction beside that, with the
+    effects `possible` in place of the usual ones.
+    """
+    there = {effect.kind for effect in problem.extension.effects}
+    if problem.prediction is not None and there.issuperset(kinds):
+        return problem
+    made = build_prediction(
+        problem.spec,
+        problem.robot,
+        problem.base,
+        [] if problem.prediction is not None else problem.extension.effects,
+        acceleration_bounds(problem.spec, problem.robot),
+        problem.trajectory.duration,
+        len(problem.cost_basis.times),
+        problem.work,
+        kinds,
+        possible,
+    )
+    wide = replace(
+        problem,
+        weighting=made.weighting,
+        extension=made.extension,
+        prediction=made,
+        separation=None,
+        metric=None,
+    )
+    return on_fine_grid(wide) if made.extension.fine else wide

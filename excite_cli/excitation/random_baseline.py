@@ -15,12 +15,11 @@ import numpy as np
 from excite_cli.constraints.base import Array
 from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.excitation.base_motion import base_motion
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
-from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import Start, random_direction
 from excite_cli.excitation.task import MotionTask
-from excite_cli.workers.base import News, Tell, Workers
-from excite_cli.workers.here import Here
+from excite_cli.workers.base import Here, News, Tell, Workers
 
 _LARGEST, _GROWTH, _STEPS = 1.5, 0.75, 14
 _REFINE = 3

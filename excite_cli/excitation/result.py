@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.excitation.motion import Doubt, Motion, digest_of
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
-from excite_cli.excitation.random_baseline import RandomMotion
+from excite_cli.excitation.random_baseline import RandomBaseline, RandomMotion
 from excite_cli.excitation.sequence import FinishedMotion
-from excite_cli.excitation.stack import Stack
 from excite_cli.robot.model import Array
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 
 
 @dataclass(frozen=True, repr=False)
@@ -106,3 +106,16 @@ def _same(first: Array, second: Array) -> bool:
 
 def _listed(names: tuple[str, ...]) -> str:
     return ", ".join(names) or "none"
+
+
+@dataclass(frozen=True, repr=False)
+class Comparison(Shown):
+    """The `result` with the random motions in it, and how these were drawn."""
+
+    result: Result
+    baseline: RandomBaseline
+
+    @property
+    def seconds(self) -> float:
+        """What the optimiser took [s]."""
+        return sum(motion.seconds for motion in self.result.motions)

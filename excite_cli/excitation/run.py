@@ -4,18 +4,23 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from excite_cli.config.load_spec import parse_spec, spec_as_yaml
 from excite_cli.config.spec import OptimizerSpec, SequenceSpec, Spec
 from excite_cli.errors import FileError
-from excite_cli.excitation.dense_grid import dense_condition_number
-from excite_cli.excitation.ending import motions_within
 from excite_cli.excitation.motion import Doubt
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import ProgressCallback, Status
 from excite_cli.excitation.result import Result, matches
-from excite_cli.excitation.sequence import FinishedMotion, generate_sequence
+from excite_cli.excitation.sequence import (
+    FinishedMotion,
+    dense_condition_number,
+    generate_sequence,
+    motions_within,
+)
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
-from excite_cli.excitation.stack import Stack
 from excite_cli.geometry.reasons import dropped_in_words
 from excite_cli.trajectory.fade import Segment
 from excite_cli.workers.base import Workers
@@ -202,3 +207,20 @@ def _pairs(problem: Problem) -> tuple[tuple[str, ...], tuple[str, ...]]:
             checked += constraint.labels
             dropped += map(dropped_in_words, left_out)
     return tuple(checked), tuple(dropped)
+
+
+def planned_stack(problem: Problem, motion: Segment) -> tuple[Stack, str]:
+    """The motion's rows as a stack that fits `problem`, and what was made of it in words.
+
+    It is sampled as sparsely as the cost grid, so that a second of it weighs as much as a second of
+    the motions to be planned.
+    """
+    step = float(np.diff(problem.cost_basis.times[:2])[0])
+    duration = motion.trajectory.duration
+    count = max(2, round(duration / step))
+    times = np.minimum(np.arange(count, dtype=float) * step, duration)
+    block = problem.objective().block_of(
+        times, *motion.trajectory.states(times, motion.coefficients)
+    )
+    words = f"{duration:.4g} s of motion, {count} samples every {step:.3g} s (as the cost grid)"
+    return Stack.empty(problem.columns).with_rows(block), words

@@ -10,7 +10,7 @@ from importlib.resources import files
 import numpy as np
 
 from excite_cli.effects.base import Effect
-from excite_cli.effects.c_code import real, reals
+from excite_cli.effects.mechanism import real, reals
 from excite_cli.effects.sign import WIDTH
 from excite_cli.export.exported import ModelText, in_words
 from excite_cli.identification.identified_model import IdentifiedModel

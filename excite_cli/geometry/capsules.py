@@ -22,8 +22,8 @@ from excite_cli.geometry.capsule_cover import cover
 from excite_cli.geometry.capsule_fit import segment_distances
 from excite_cli.geometry.link_shapes import collision_model, link_shapes, placed_shapes
 from excite_cli.robot.capsule import Capsule
+from excite_cli.robot.carried_payload import check_size
 from excite_cli.robot.model import Robot
-from excite_cli.robot.reach import check_size
 
 # Fitted capsules on disk, under a key of all that decides the fit.
 

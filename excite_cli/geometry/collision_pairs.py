@@ -28,7 +28,7 @@ from excite_cli.geometry.mesh_pairs import joined_links
 from excite_cli.geometry.pair_distances import PairDistances
 from excite_cli.geometry.reasons import NEVER, DroppedPair, LinksApart, Reason, Why
 from excite_cli.robot.capsule import Capsule
-from excite_cli.robot.carried_bodies import MovedBodies
+from excite_cli.robot.link_frame import MovedBodies
 from excite_cli.robot.model import Robot
 
 # Why pairs of capsules are dropped, on disk: what takes seconds is found once for a robot.

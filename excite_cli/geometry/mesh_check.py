@@ -13,15 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.geometry.hull_bounds import ball_bounds, hull_bounds
 from excite_cli.geometry.link_meshes import LinkMesh, Poses, link_meshes
 from excite_cli.geometry.mesh_pairs import (
     MeshPair,
     PairMeshes,
+    RelativeReach,
+    ball_bounds,
+    hull_bounds,
     movable_pairs,
 )
 from excite_cli.geometry.reasons import ContactMeaning
-from excite_cli.geometry.relative_reach import RelativeReach
 from excite_cli.robot.model import Robot
 
 Array = NDArray[np.float64]

@@ -23,7 +23,7 @@ from excite_cli.geometry.world_segments import (
 )
 from excite_cli.kernels.compiled import KERNELS
 from excite_cli.robot.capsule import Capsule
-from excite_cli.robot.carried_bodies import carried_bodies
+from excite_cli.robot.link_frame import carried_bodies
 from excite_cli.robot.model import Robot
 
 Array = NDArray[np.float64]

@@ -19,14 +19,18 @@ from excite_cli.disk_cache import store_arrays, stored_arrays
 from excite_cli.errors import ConfigError
 from excite_cli.geometry.capsules import geometry_key
 from excite_cli.geometry.collision_pairs import CollisionPairs
-from excite_cli.geometry.hull_bounds import hull_bounds
 from excite_cli.geometry.link_meshes import LinkMesh, Poses, link_meshes
 from excite_cli.geometry.link_shapes import collision_model
-from excite_cli.geometry.mesh_pairs import PairMeshes, joined_links, movable_pairs
-from excite_cli.geometry.pair_table import PairTable
+from excite_cli.geometry.mesh_pairs import (
+    PairMeshes,
+    PairTable,
+    hull_bounds,
+    joined_links,
+    movable_pairs,
+)
 from excite_cli.geometry.reasons import NEVER
 from excite_cli.robot.capsule import Capsule
-from excite_cli.robot.carried_bodies import MovedBodies
+from excite_cli.robot.link_frame import MovedBodies
 from excite_cli.robot.model import Robot
 
 Array = NDArray[np.float64]

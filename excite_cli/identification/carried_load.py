@@ -19,8 +19,8 @@ from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import carried_body
+from excite_cli.effects.judgement import half_of
 from excite_cli.effects.parameter import Value, deviation
-from excite_cli.effects.rare_sizes import half_of
 from excite_cli.effects.signals import Signals
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.identification.errors_of_torque import Errors
@@ -44,7 +44,7 @@ from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.link_frame import LinkFrame, carrying_frame
 from excite_cli.robot.model import Array, Robot
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 
 _TIMES_THE_FIT = 2.0  # of the error that the fit had: more is no load
 _COMPACT = 0.05  # m, radius of the load that a motion is planned for, and how far off it hangs

@@ -28,9 +28,7 @@ import numpy as np
 from scipy.linalg import block_diag, solve_triangular
 
 from excite_cli.dynamics.base_parameters import BaseParameters
-from excite_cli.dynamics.inertial_prior import InertialPrior
-from excite_cli.dynamics.nearest_inertias import nearest_inertias
-from excite_cli.dynamics.pseudo_inertia import smallest_eigenvalues
+from excite_cli.dynamics.pseudo_inertia import InertialPrior, nearest_inertias, smallest_eigenvalues
 from excite_cli.fields import shape
 from excite_cli.identification.factors import Mask, triangle_of
 from excite_cli.robot.model import Array

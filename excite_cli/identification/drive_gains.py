@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from excite_cli.effects.rare_sizes import half_of
+from excite_cli.effects.judgement import half_of
 from excite_cli.robot.model import Array
 
 _STEPS, _SETTLED = 30, 1e-4  # of Gauss and Newton; in log kp

@@ -37,10 +37,10 @@ from scipy.optimize import lsq_linear, minimize_scalar
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import BaseParameters
-from excite_cli.dynamics.inertial_prior import UNSURE, inertial_prior
+from excite_cli.dynamics.pseudo_inertia import UNSURE, inertial_prior
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION, catalogue
-from excite_cli.effects.rare_sizes import half_of
+from excite_cli.effects.judgement import half_of
 from excite_cli.identification.drive_gains import Gains, fit_gains
 from excite_cli.identification.prepare import prepare_all, smoothed
 from excite_cli.identification.processing import choose_processing

@@ -14,8 +14,7 @@ import numpy as np
 
 from excite_cli.config.data_spec import IdentificationSpec
 from excite_cli.dynamics.base_parameters import BaseParameters
-from excite_cli.dynamics.inertial_prior import InertialPrior, inertial_prior
-from excite_cli.dynamics.pseudo_inertia import body_lengths
+from excite_cli.dynamics.pseudo_inertia import InertialPrior, body_lengths, inertial_prior
 from excite_cli.dynamics.regressor import standard_parameter_unit, standard_parameters
 from excite_cli.effects.base import Effect, Parameter, Value
 from excite_cli.effects.parameter import unit_of_slider
@@ -33,7 +32,7 @@ from excite_cli.identification.link_changes import LinkChange, inertial_covarian
 from excite_cli.identification.prior import as_wide_as_needed, prior_of
 from excite_cli.identification.regression import Regression, follows_model, places_of, rebuilt
 from excite_cli.robot.model import Array, Robot
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 
 # A parameter is identifiable if the data fix it to this share of its value or usual size.
 _FIXED = 0.5

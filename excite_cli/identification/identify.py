@@ -47,7 +47,7 @@ from excite_cli.identification.torque_trace import TorqueTrace, torque_trace, to
 from excite_cli.measurement.campaign_clock import Recorded, recorded
 from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.robot.model import Robot
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 
 Tell = Callable[[str], None]
 # Parameters this many standard deviations below zero that cannot be negative are reported.

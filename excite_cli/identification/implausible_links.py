@@ -19,8 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from excite_cli.dynamics.inertial_prior import InertialPrior
-from excite_cli.dynamics.pseudo_inertia import body_lengths
+from excite_cli.dynamics.pseudo_inertia import InertialPrior, body_lengths
 from excite_cli.errors import RobotError
 from excite_cli.geometry.link_shapes import collision_model, link_shapes, visual_model
 from excite_cli.identification.link_changes import LinkChange

@@ -18,8 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.dynamics.base_parameters import BaseParameters
-from excite_cli.dynamics.inertial_prior import InertialPrior
-from excite_cli.dynamics.pseudo_inertia import moved
+from excite_cli.dynamics.pseudo_inertia import InertialPrior, moved
 from excite_cli.identification.consistent import without_constraints
 from excite_cli.robot.link_frame import own_link
 from excite_cli.robot.model import Array, Robot

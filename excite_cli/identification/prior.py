@@ -5,7 +5,7 @@ from typing import TypeVar
 
 from excite_cli.config.data_spec import IdentificationSpec
 from excite_cli.dynamics.base_parameters import BaseParameters
-from excite_cli.dynamics.inertial_prior import UNSURE, InertialPrior, inertial_prior
+from excite_cli.dynamics.pseudo_inertia import UNSURE, InertialPrior, inertial_prior
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.robot.model import Array, Robot
 

@@ -13,7 +13,7 @@ from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.measurement.campaign_clock import Recorded
 from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.model import Robot
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 
 # What a fit file holds, as a frozen record.
 

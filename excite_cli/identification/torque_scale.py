@@ -25,7 +25,7 @@ from excite_cli.dynamics.pseudo_inertia import moved
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import carried_body, scales
-from excite_cli.effects.rare_sizes import half_of
+from excite_cli.effects.judgement import half_of
 from excite_cli.errors import ConfigError
 from excite_cli.identification.link_changes import SIX_AT, about_frame, slopes
 from excite_cli.identification.regression import places_of, width_of

@@ -20,9 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.dynamics.base_parameters import BaseParameters
-from excite_cli.dynamics.inertial_prior import InertialPrior
-from excite_cli.dynamics.nearest_inertias import nearest_inertias
-from excite_cli.dynamics.pseudo_inertia import pseudo_inertias
+from excite_cli.dynamics.pseudo_inertia import InertialPrior, nearest_inertias, pseudo_inertias
 from excite_cli.errors import ConfigError
 from excite_cli.identification.consistent import without_constraints
 from excite_cli.identification.factors import Mask

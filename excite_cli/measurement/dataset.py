@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from excite_cli.measurement.run_identity import Origin, Part, RunId
 from excite_cli.out_of_core import Spool
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 
 _BEFORE = 20.0  # s: longer ago is forgotten
 Array = NDArray[np.float64]

@@ -16,8 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.dynamics.forward_kinematics import States
-from excite_cli.proof.enclosed_motion import EnclosedMotion
-from excite_cli.proof.enclosed_trajectory import Intervals, enclosed_states, intervals_of
+from excite_cli.proof.enclosed_motion import (
+    EnclosedMotion,
+    Intervals,
+    enclosed_states,
+    intervals_of,
+)
 from excite_cli.robot.model import Robot
 from excite_cli.trajectory.base import Trajectory
 

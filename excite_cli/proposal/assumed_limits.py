@@ -1,4 +1,4 @@
-"""Limits that a plan can work with, where the URDF has none or placeholders.
+"""Limits and pace of a plan, where the URDF has no limits, or placeholders.
 
 A figure is taken for a placeholder where no real joint has it: speeds of 0 or beyond 60 rad/s,
 torques of 0 or from 1000 N·m on, ranges beyond two turns either way. What is assumed lies within
@@ -6,10 +6,13 @@ the range that the URDF gives, if it gives one: 0 to 0 is none.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from excite_cli.robot.urdf_joints import UrdfJoint
+from excite_cli.trajectory.base import harmonics_for
 
 _FASTEST, _FASTEST_SLIDE = 60.0, 10.0
 _STRONGEST, _STRONGEST_SLIDE = 1000.0, 20_000.0
@@ -136,3 +139,43 @@ def _as_given(value: float, unit: str) -> str:
 def rounded(value: float, digits: int = 2) -> float:
     """`value` to some significant digits."""
     return float(f"{value:.{digits}g}")
+
+
+# How long a motion should be, and how many harmonics it should have.
+
+_SHORTEST_MOTION, _LONGEST_MOTION = 10.0, 20.0
+# How far the slowest joint should come either way: this share of half of its range, at most.
+_SHARE, _FAR, _FAR_SLIDE = 0.5, 0.8, 0.1
+# Forty instants to a period of the highest harmonic; what lies between them is proved.
+_INSTANTS = 200
+
+
+@dataclass(frozen=True)
+class Pace:
+    """Seconds of one motion, harmonics, instants of the constraint grid.
+
+    slowest: the joint that asks for so long a motion; None where the usual length is enough.
+    """
+
+    duration: float
+    harmonics: int
+    constraint_samples: int
+    slowest: str | None
+
+    @property
+    def base_frequency(self) -> float:
+        """ω [rad/s]."""
+        return 2 * math.pi / self.duration
+
+
+def choose_pace(joints: Sequence[JointPlan]) -> Pace:
+    """The pace that lets the slowest joint use half of its range with the first harmonic."""
+    needed = []
+    for joint in joints:
+        far = min(_SHARE * joint.width / 2, _FAR_SLIDE if joint.sliding else _FAR)
+        needed.append(2 * math.pi * far / joint.velocity)
+    slowest = int(np.argmax(needed))
+    duration = float(math.ceil(min(max(needed[slowest], _SHORTEST_MOTION), _LONGEST_MOTION)))
+    usual = needed[slowest] <= _SHORTEST_MOTION
+    harmonics = harmonics_for(duration, np.array([joint.acceleration for joint in joints]))
+    return Pace(duration, harmonics, _INSTANTS, None if usual else joints[slowest].name)

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from excite_cli.config.load_spec import parsed_spec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.joint_columns import Quantity
-from excite_cli.constraints.mesh_clearance import MeshClearance
 from excite_cli.constraints.obstacle_clearance import Surroundings
+from excite_cli.constraints.self_collision import MeshClearance
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.start import (
@@ -37,7 +37,7 @@ from excite_cli.geometry.mesh_pairs import joined_links
 from excite_cli.geometry.obstacles import FLOOR
 from excite_cli.geometry.pair_tables import near_at_posture
 from excite_cli.proposal.assumed_limits import JointPlan
-from excite_cli.robot.carried_bodies import MovedBodies
+from excite_cli.robot.link_frame import MovedBodies
 
 # A posture to start from: one that others wrote down, bent and away from limits, then clear.
 

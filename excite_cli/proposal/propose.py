@@ -12,9 +12,14 @@ from excite_cli.config.load_spec import apply_override, parse_spec, parsed_spec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.excitation.problem import with_shapes
-from excite_cli.proposal.assumed_limits import MOST_ACCELERATION, JointPlan, plan_limits
-from excite_cli.proposal.cell import Cell, put_cell
-from excite_cli.proposal.disabled_pairs import chosen_srdf, disabled_pairs
+from excite_cli.proposal.assumed_limits import (
+    MOST_ACCELERATION,
+    JointPlan,
+    Pace,
+    choose_pace,
+    plan_limits,
+)
+from excite_cli.proposal.cell import Cell, Floor, floor_below, put_cell
 from excite_cli.proposal.feasibility import (
     Comments,
     FeasibleProblem,
@@ -23,17 +28,22 @@ from excite_cli.proposal.feasibility import (
     first_posture,
     settle,
 )
-from excite_cli.proposal.floor import Floor, floor_below
 from excite_cli.proposal.joints import JointChoice, choose_joints
-from excite_cli.proposal.shapes import Shapes, choose_shapes
-from excite_cli.proposal.timing import Pace, choose_pace
+from excite_cli.proposal.shapes import (
+    Shapes,
+    choose_shapes,
+    chosen_srdf,
+    disabled_pairs,
+    read_srdf,
+    reference_posture,
+    srdf_near,
+)
 from excite_cli.robot.assumed_inertias import with_assumed_inertias
 from excite_cli.robot.description import RobotDescription
+from excite_cli.robot.mesh_paths import Allow, allow_nothing, load_with_folders
 from excite_cli.robot.model import build_robot
-from excite_cli.robot.package_search import Allow, allow_nothing, load_with_folders
-from excite_cli.robot.srdf import read_srdf, reference_posture, srdf_near
 from excite_cli.robot.urdf_joints import UrdfSurvey
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 
 _TORQUE_SHARE = 0.8
 _MARGIN = 0.01

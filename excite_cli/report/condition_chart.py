@@ -6,10 +6,10 @@ import numpy as np
 
 from excite_cli.criteria.base import condition_number, singular_values
 from excite_cli.excitation.motion import Motion
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import RandomMotion
 from excite_cli.excitation.result import Result
-from excite_cli.excitation.stack import Stack
 from excite_cli.report.chart import Colour, in_figures
 from excite_cli.report.plot import Curve, Panel, Plot
 from excite_cli.robot.model import Array

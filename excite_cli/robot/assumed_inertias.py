@@ -19,7 +19,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from excite_cli.disk_cache import store_arrays, stored_arrays
 from excite_cli.robot.description import RobotDescription
-from excite_cli.robot.formats.urdf_parts import origin_of
+from excite_cli.robot.formats.base import origin_of
 from excite_cli.robot.mesh_paths import Kind, MeshFiles, unusable
 
 Array = NDArray[np.float64]

@@ -21,13 +21,11 @@ from pathlib import Path
 from excite_cli.errors import RobotError, nearest
 from excite_cli.given_files import require_stored
 from excite_cli.robot.allowed_files import own_folder
-from excite_cli.robot.descriptions_package import PREFIX, Found, find_description
-from excite_cli.robot.formats.base import ConversionRequest
+from excite_cli.robot.formats.base import ConversionRequest, add_shape, capsule, origin_of
 from excite_cli.robot.formats.catalogue import as_urdf
-from excite_cli.robot.formats.urdf_parts import add_shape, capsule, origin_of
 from excite_cli.robot.limits import UNBOUNDED, ordered_limits
-from excite_cli.robot.loops import Loop, closed_loops, loops_in_words
-from excite_cli.robot.mimic import Mimic, lost, mimics
+from excite_cli.robot.loops import Loop, Mimic, closed_loops, loops_in_words, lost, mimics
+from excite_cli.robot.ros_packages import PREFIX, Found, find_description
 from excite_cli.robot.urdf_check import parsed
 
 # What simulators take in a URDF and its standard does not have, put into the standard's words.

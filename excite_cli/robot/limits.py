@@ -13,11 +13,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.config.limit_presets import LIMIT_PRESETS
-from excite_cli.config.robot_spec import JointLimits, RobotSpec
+from excite_cli.config.robot_spec import LIMIT_PRESETS, JointLimits, RobotSpec
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.robot.effort_curve import EffortCurve
-from excite_cli.robot.mimic import Mimic
+from excite_cli.robot.loops import Mimic
 
 # Position limits as the file of a robot writes them, whatever its format.
 #

@@ -20,7 +20,6 @@ from excite_cli.measurement.motors import Motors, motors_of
 from excite_cli.robot.assumed_inertias import with_assumed_inertias
 from excite_cli.robot.base_joints import BASE_JOINTS, on_base_joints
 from excite_cli.robot.carried_payload import CarriedPayload, add_payload, payload_on
-from excite_cli.robot.coupling import Coupling
 from excite_cli.robot.description import RobotDescription, load_description
 from excite_cli.robot.limits import (
     UNBOUNDED,
@@ -30,9 +29,9 @@ from excite_cli.robot.limits import (
     given_limits,
     limits_of,
 )
-from excite_cli.robot.mimic import Mimic
+from excite_cli.robot.loops import Mimic
 from excite_cli.robot.parsed_model import parsed_model, reduced_model
-from excite_cli.robot.posture import posture_of, require_known
+from excite_cli.robot.posture import Coupling, posture_of, require_known
 
 Array = NDArray[np.float64]
 

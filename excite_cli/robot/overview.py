@@ -12,7 +12,7 @@ from typing import Literal
 
 from excite_cli.robot.description import example_robots
 from excite_cli.robot.model import Robot, links_by_joint
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 
 # The joints and links of one robot, with their limits.
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from excite_cli.robot.description import RobotDescription
 from excite_cli.robot.limits import UNBOUNDED, JointRange
-from excite_cli.robot.mimic import Mimic
+from excite_cli.robot.loops import Mimic
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from excite_cli.identification.fit import Fit
 from excite_cli.identification.stored_model import StoredFit
 from excite_cli.robot.model import Array
 from excite_cli.scoring.records import Score
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 
 SIGNIFICANT = 0.05
 # Deviations of fits are too small by this factor (variance) over days: with 1.6, one of 17

@@ -7,7 +7,7 @@ from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.effects.base import Value
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.measurement.dataset import Finding
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 
 # What a replay holds, as a frozen record.
 

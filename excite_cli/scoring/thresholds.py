@@ -18,7 +18,7 @@ from scipy.optimize import nnls
 
 from excite_cli.errors import ConfigError
 from excite_cli.robot.model import Array
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 
 REVERSAL = 0.05  # rad/s: friction is known least below
 _HOUR = 3600.0

@@ -15,8 +15,7 @@ from excite_cli.base_link.state import reference_rotation, unit_on_base
 from excite_cli.base_link.wrench_rows import frames_of, sign_of
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.config.wrench_spec import ImuSpec
-from excite_cli.dynamics.contact_frames import contact_jacobians
-from excite_cli.dynamics.inertial_unit import readings
+from excite_cli.dynamics.contact_frames import contact_jacobians, readings
 from excite_cli.measurement.base_channel import of_base_state, of_imu, of_wrench
 from excite_cli.measurement.dataset import Array, Run
 from excite_cli.robot.model import Robot

@@ -17,7 +17,7 @@ from excite_cli.errors import ConfigError, nearest
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array, Robot
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 from excite_cli.simulation.base_sensors import Instruments
 from excite_cli.simulation.build import Build, assemble, make, true_inertias
 from excite_cli.simulation.controller import (

@@ -12,8 +12,7 @@ from excite_cli.config.spec import IdentifiedSpec, Spec
 from excite_cli.diagnosis.candidates import effect_of
 from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.dynamics.base_parameters import find_base_parameters
-from excite_cli.dynamics.inertial_prior import inertial_prior
-from excite_cli.dynamics.pseudo_inertia import body_lengths
+from excite_cli.dynamics.pseudo_inertia import body_lengths, inertial_prior
 from excite_cli.dynamics.regressor import standard_parameter_names, standard_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import kind_named, urdf_friction

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from excite_cli.atomic import write_atomically
 from excite_cli.excitation.motion import Doubt, Motion, digest_of_array
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Status
 from excite_cli.excitation.random_baseline import RandomMotion
 from excite_cli.excitation.result import Result
-from excite_cli.excitation.stack import Stack
 from excite_cli.measurement.hdf5_writer import new_hdf5
 from excite_cli.measurement.memory_limit import limited_memory
 from excite_cli.proof.certificate import Worst

@@ -7,8 +7,17 @@ import numpy as np
 from excite_cli.campaign.records import Campaign, CampaignRound, RoundFindings
 from excite_cli.fields import data_of
 from excite_cli.report.plot import Curve, Panel, Plot
-from excite_cli.shown.answer import Answer, Charts, KeyFigure, Page, Part, Section, Table, Text
-from excite_cli.shown.record import show
+from excite_cli.shown.answer import (
+    Answer,
+    Charts,
+    KeyFigure,
+    Page,
+    Part,
+    Section,
+    Table,
+    Text,
+    show,
+)
 
 
 def round_in_words(number: int, learned: RoundFindings) -> str:

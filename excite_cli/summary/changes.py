@@ -13,8 +13,7 @@ from excite_cli.report.chart import Colour, limits_about
 from excite_cli.report.plot import Curve, Panel, Plot
 from excite_cli.robot.model import Array
 from excite_cli.scoring.changes import Change, Changes
-from excite_cli.shown.answer import Answer, Charts, KeyFigure, Page, Parts, Section, Table
-from excite_cli.shown.record import show
+from excite_cli.shown.answer import Answer, Charts, KeyFigure, Page, Parts, Section, Table, show
 from excite_cli.summary.cells import files_in_words
 
 _LEAST_P = 1e-16  # of any sum of so many rounded numbers, smaller ones say nothing

@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from excite_cli.diagnosis.answer_words import answer_in_words
+from excite_cli.diagnosis.answer_words import answer_in_words, shares
 from excite_cli.diagnosis.next_motion import next_command, next_experiment
 from excite_cli.diagnosis.records import Diagnosis, EffectRecord, NamedEffect, Round
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.diagnosis.words import (
+    approximation_in_words,
     counted,
     covariate_in_words,
     no_gain_in_words,
@@ -19,8 +20,8 @@ from excite_cli.diagnosis.words import (
     rests_in_words,
     value_in_words,
 )
-from excite_cli.report.dependence_chart import dependence_plots
-from excite_cli.report.residual_chart import residuals_in_time
+from excite_cli.fields import data_of, public_data
+from excite_cli.report.residual_chart import dependence_plots, residuals_in_time
 from excite_cli.shown.answer import (
     Answer,
     Block,
@@ -35,10 +36,9 @@ from excite_cli.shown.answer import (
     Text,
     as_word,
     parts_of,
+    show,
 )
-from excite_cli.shown.record import show
 from excite_cli.summary.cells import files_in_words
-from excite_cli.summary.diagnosis_data import diagnosis_data
 from excite_cli.summary.effect_evidence import evidence_section
 from excite_cli.summary.error_by_joint import errors_section
 from excite_cli.summary.findings import data_blocks
@@ -361,3 +361,87 @@ show(
     _named_in_words,
     lambda named: [effect_table([named], 0, Detail.VERBOSE), *other_names(named, 0)],
 )
+
+
+def _record(record: EffectRecord) -> dict[str, Any]:
+    """Where it has a shape, runs or a column, these too."""
+    found: dict[str, Any] = data_of(record, "kind", "joints", "shape", "runs", "covariate")
+    return {key: value for key, value in found.items() if value or key in ("kind", "joints")}
+
+
+def _records(records: tuple[EffectRecord, ...]) -> list[dict[str, Any]]:
+    return [_record(each) for each in records]
+
+
+def _named(named: NamedEffect, runs: list[str]) -> dict[str, Any]:
+    record = named.effect
+    beside = {key: getattr(record, key) for key in ("link", "covariate") if getattr(record, key)}
+    evidence = data_of(
+        named, "parameters", "p_value", "share_of_residual", "gain", "verdict", "removes"
+    )
+    return {
+        **data_of(record, "kind", "joints"),
+        **beside,
+        **evidence,
+        "alias_set": _records(named.aliases),
+        "runs": list(record.runs) or runs,
+        "error_reduction": dict(named.parts),
+    }
+
+
+def _model(found: Diagnosis) -> dict[str, Any]:
+    """All numbers of the model that predicts: inertias, and every effect, declared or found."""
+    named = dict(zip(found.inertia_names, map(float, found.phi), strict=False))
+    records = [*found.declared, *(each.effect for each in found.effects)]
+    return {
+        "inertias": named,
+        "effects": [{**_record(each), "values": list(each.values)} for each in records],
+    }
+
+
+def _error(found: Diagnosis) -> dict[str, Any]:
+    """Errors of every model, and where the parts of the effects begin."""
+    return {
+        **data_of(found, "held_out_run", "before", "after", "untouched"),
+        "textbook": data_of(found.textbook.error) if found.textbook else None,
+        "training": data_of(found.trained),
+        "parts": [{**data_of(each), "effects": _records(each.effects)} for each in found.parts],
+        "baseline": "untouched" if found.inertia_parts else "before",
+        "inertias_error_reduction": dict(found.inertia_parts),
+        "samples": found.after.samples,
+    }
+
+
+def diagnosis_data(found: Diagnosis, experiment: dict[str, Any]) -> dict[str, Any]:
+    """The answer for `--json`: what follows from the record, and its public fields."""
+    runs = [str(name) for name in found.processing.get("runs", [])]
+    return {
+        "good": found.good,
+        "reason": no_gain_in_words(found),
+        "answer": answer_in_words(found),
+        "shares": shares(found),
+        "declared_effects": _records(found.declared),
+        "effects": [_named(each, runs) for each in found.named],
+        "approximations": [
+            {**_named(each, runs), "stands_for": approximation_in_words(each.approximates)}
+            for each in found.effects
+            if each.approximates
+        ],
+        "joint_aliases": [
+            {
+                "named": _records(each.named),
+                "others": _records(each.others),
+                "same_torque": each.same_torque,
+            }
+            for each in found.joint_aliases
+        ],
+        "model": _model(found),
+        "unexplained": [
+            {"share_of_residual": each.predictable, **data_of(each, "joint", "depends_on")}
+            for each in found.unexplained
+        ],
+        "error": _error(found),
+        "textbook": _records(found.textbook.effects) if found.textbook else None,
+        "next_experiment": experiment,
+        **public_data(found),
+    }

@@ -9,7 +9,7 @@ from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit_words import above_the_floor
 from excite_cli.report.chart import Chart
 from excite_cli.report.error_chart import DECLARED_AND_FOUND, NOTHING_MOVES, error_charts
-from excite_cli.report.robot_chart import robot_chart
+from excite_cli.report.posture_chart import robot_chart
 from excite_cli.shown.answer import Block, Charts, Detail, Section, Table
 from excite_cli.summary.cells import figure, percent
 from excite_cli.summary.named_effects import what_and_where

@@ -12,8 +12,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.report.condition_chart import condition_chart, spectrum_chart
 from excite_cli.report.error_chart import DECLARED_AND_FOUND, error_charts
-from excite_cli.report.margin_chart import margin_charts
-from excite_cli.report.motion_chart import motion_cards, signals_of
+from excite_cli.report.motion_chart import margin_charts, motion_cards, signals_of
 from excite_cli.report.plot_figure import draw_plots, draw_rows
 from excite_cli.report.residual_chart import plots_in_time
 from excite_cli.summary.effect_evidence import effect_plots, friction_plots

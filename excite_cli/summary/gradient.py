@@ -7,8 +7,7 @@ from excite_cli.excitation.gradient_check import (
     GradientCheck,
 )
 from excite_cli.fields import data_of
-from excite_cli.shown.answer import Answer, Parts, Table
-from excite_cli.shown.record import show
+from excite_cli.shown.answer import Answer, Parts, Table, show
 
 _PAIRS = {
     "adjoint_vs_block": ("adjoint – block form", f"{ADJOINT_BLOCK_LIMIT:.0e}"),

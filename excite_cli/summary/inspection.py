@@ -19,9 +19,9 @@ from excite_cli.shown.answer import (
     Table,
     Text,
     as_word,
+    show,
 )
-from excite_cli.shown.record import show
-from excite_cli.summary.expectation import power_data, power_table
+from excite_cli.summary.weakest import power_data, power_table
 
 # Measured data in words, and their runs as a table.
 

@@ -2,13 +2,11 @@
 
 from typing import Any
 
-from excite_cli.excitation.inspection import Inspection, Inspections
-from excite_cli.excitation.not_modelled import not_modelled
+from excite_cli.excitation.inspection import Inspection, Inspections, not_modelled
 from excite_cli.excitation.problem import Problem
 from excite_cli.fields import data_of
 from excite_cli.geometry.reasons import standing_in_words
-from excite_cli.shown.answer import Answer, Parts, Table
-from excite_cli.shown.record import show
+from excite_cli.shown.answer import Answer, Parts, Table, show
 from excite_cli.summary.pairs import not_modelled_in_words, pairs_data, pairs_in_words, worst_data
 
 _CAPTION = "Margins are distances to the limit, beyond any safety margin that the config requires."

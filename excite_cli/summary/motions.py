@@ -10,19 +10,15 @@ from excite_cli.config.spec import UntilSpec
 from excite_cli.diagnosis.expectation import expectation
 from excite_cli.diagnosis.goals import Goal, Goals
 from excite_cli.diagnosis.next_motion import NextMotion
-from excite_cli.excitation.dense_grid import flattered
+from excite_cli.excitation.inspection import not_modelled
 from excite_cli.excitation.invariant import Invariants, design_for, invariants
 from excite_cli.excitation.motion import Motion
-from excite_cli.excitation.not_modelled import not_modelled
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Status
-from excite_cli.excitation.random_baseline import RandomMotion
-from excite_cli.excitation.random_comparison import Comparison
-from excite_cli.excitation.result import Result
+from excite_cli.excitation.result import Comparison, RandomMotion, Result
+from excite_cli.excitation.sequence import flattered
 from excite_cli.fields import data_of
-from excite_cli.shown.answer import Answer, Detail, Parts, Table
-from excite_cli.shown.record import show
-from excite_cli.summary.expectation import expectation_parts, power_data
+from excite_cli.shown.answer import Answer, Detail, Parts, Table, show
 from excite_cli.summary.pairs import (
     doubts_in_words,
     not_modelled_in_words,
@@ -31,6 +27,7 @@ from excite_cli.summary.pairs import (
     worst_data,
 )
 from excite_cli.summary.problem import problem_parts
+from excite_cli.summary.weakest import expectation_parts, power_data
 from excite_cli.trajectory.fade import Segment
 
 

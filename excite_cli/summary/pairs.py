@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from typing import Any
 
 from excite_cli.constraints.obstacle_clearance import Surroundings
-from excite_cli.excitation.motion import Doubt, Motion
-from excite_cli.excitation.not_modelled import (
+from excite_cli.excitation.inspection import (
     bodies_without_shapes,
     links_without_shapes,
     not_modelled,
 )
+from excite_cli.excitation.motion import Doubt, Motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.fields import data_of
 from excite_cli.geometry.reasons import DroppedPair, Why, dropped_in_words, reason_in_words

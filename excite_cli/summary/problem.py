@@ -13,9 +13,8 @@ from excite_cli.geometry.reasons import dropped_in_words
 from excite_cli.proposal.propose import Proposal
 from excite_cli.robot.loops import loops_in_words
 from excite_cli.robot.model import Robot
-from excite_cli.shown.answer import Answer, Command, Parts, Table, as_word
+from excite_cli.shown.answer import Answer, Command, Parts, Table, as_word, show
 from excite_cli.shown.note import Level, Note
-from excite_cli.shown.record import show
 
 # A proposed config in words.
 

@@ -10,8 +10,7 @@ from excite_cli.excitation.result import Result
 from excite_cli.geometry.reasons import reason_in_words
 from excite_cli.report.chart import in_figures
 from excite_cli.report.condition_chart import condition_chart, spectrum_chart
-from excite_cli.report.margin_chart import margin_charts
-from excite_cli.report.motion_chart import motion_cards, peaks_table, signals_of
+from excite_cli.report.motion_chart import margin_charts, motion_cards, peaks_table, signals_of
 from excite_cli.report.posture_chart import posture_chart
 from excite_cli.shown.answer import (
     Block,

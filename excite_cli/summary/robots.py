@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from excite_cli.fields import data_of
 from excite_cli.robot.description import EXAMPLE_PREFIX
 from excite_cli.robot.overview import DescribedRobot, Glance
-from excite_cli.shown.answer import Answer, Parts, Table
-from excite_cli.shown.record import show
+from excite_cli.shown.answer import Answer, Parts, Table, show
 
 
 def robots_answer(found: Sequence[Glance], names: Sequence[str]) -> Answer:

@@ -12,8 +12,7 @@ from excite_cli.report.chart import Colour
 from excite_cli.report.plot import Curve, Panel, Plot
 from excite_cli.scoring.records import RunExplanation, Score, ScoredRun
 from excite_cli.scoring.thresholds import Thresholds
-from excite_cli.shown.answer import Answer, Charts, KeyFigure, Parts, Section, Table, parts_of
-from excite_cli.shown.record import show
+from excite_cli.shown.answer import Answer, Charts, KeyFigure, Parts, Section, Table, parts_of, show
 from excite_cli.summary.cells import figure, findings_data, percent
 
 # Thresholds of a collision detector in words and as a table.

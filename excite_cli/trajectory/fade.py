@@ -12,10 +12,10 @@ from math import comb
 
 import numpy as np
 
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Shown
 from excite_cli.trajectory.base import Array, Trajectory
 from excite_cli.trajectory.fourier import FourierTrajectory
-from excite_cli.trajectory.slowed import Slowed
+from excite_cli.trajectory.point_to_point import Slowed
 
 # Trajectories one after the other: an entry, a motion played several times, a return.
 

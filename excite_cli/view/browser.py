@@ -21,9 +21,9 @@ from excite_cli.errors import ConfigError, MissingExtraError
 from excite_cli.excitation.problem import Problem
 from excite_cli.robot.model import Robot
 from excite_cli.trajectory.fade import Segment
-from excite_cli.view.camera import fitted_camera
 from excite_cli.view.guarded_server import guarded
 from excite_cli.view.instants import Instants, instants_of
+from excite_cli.view.rays import fitted_camera
 from excite_cli.view.scene import build_scene
 from excite_cli.view.stage import SceneNodes
 

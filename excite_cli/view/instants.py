@@ -6,8 +6,8 @@ import numpy as np
 
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.drawing import NearestBodies
-from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.forward_kinematics import States
+from excite_cli.dynamics.whole_robot import CenterOfMass
 from excite_cli.excitation.nearest import nearest_bodies
 from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.link_meshes import Poses

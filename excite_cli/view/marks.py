@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from excite_cli.errors import MissingExtraError
 from excite_cli.robot.model import Array
-from excite_cli.view.camera import Camera
 from excite_cli.view.geometry import Colour
 from excite_cli.view.instants import Instants
+from excite_cli.view.rays import Camera
 from excite_cli.view.scene import Scene
 from excite_cli.view.translucent import NEAREST, REGION
 

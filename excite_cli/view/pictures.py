@@ -13,17 +13,15 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.robot.model import Array
 from excite_cli.trajectory.fade import Segment
-from excite_cli.view.camera import Camera, fitted_camera
 from excite_cli.view.geometry import Colour
 from excite_cli.view.ground import PAPER
 from excite_cli.view.instants import Instants, instants_of
 from excite_cli.view.marks import Marks, caption_of, pillow_part
-from excite_cli.view.rays import embree_part
+from excite_cli.view.rays import Camera, embree_part, fitted_camera
 from excite_cli.view.scene import Scene, build_scene, outermost
 from excite_cli.view.studio import FINE, QUICK, Studio
 from excite_cli.view.translucent import CAPSULE, NEAREST, REGION
-from excite_cli.workers.base import News, Workers
-from excite_cli.workers.here import Here
+from excite_cli.workers.base import Here, News, Workers
 
 Told = Callable[[str, int], None]
 Said = Callable[[str], None]

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.robot.model import Array
-from excite_cli.view.camera import Camera
 from excite_cli.view.geometry import Colour
 from excite_cli.view.ground import PAPER, GroundPlane, Shade
-from excite_cli.view.rays import Hits, Tracer
+from excite_cli.view.rays import Camera, Hits, Tracer
 from excite_cli.view.scene import Scene
 from excite_cli.view.surface import Surface, turn_to
 from excite_cli.view.translucent import GHOST, Pane, region_pane, wall_panes

@@ -9,8 +9,9 @@ done, nor whether one is done twice because a worker was lost.
 import io
 import pickle
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sized
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterable, Iterator, Sized
+from concurrent.futures import Future
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -221,3 +222,25 @@ class _Map:
             self.results[index] = result
         running = min(len(self.running), self.workers.count)
         self.watch(News(len(self.results), running, total, index, word, result))
+
+
+class Here(Workers):
+    """No other process; what a task raises ends the rest."""
+
+    count = 1
+    in_this_thread = True
+
+    @contextmanager
+    def _round(self, function: Function, shared: Any) -> Iterator[Give]:
+        def give(task: Any, tell: Tell) -> Future[Answer]:
+            future: Future[Answer] = Future()
+            try:
+                future.set_result(("done", function(shared, task, tell)))
+            except Exception as error:  # raised again by `map`, or kept
+                future.set_result(("failed", error))
+            return future
+
+        yield give
+
+    def close(self) -> None:
+        """Nothing to end."""

@@ -1,15 +1,16 @@
-"""The workers that a command was given, for whatever part of it has tasks to share.
+"""The workers that were requested, for whatever part of a command has tasks to share.
 
 What is computed does not depend on them, so they are no argument of the functions in between.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
 
+from excite_cli.errors import ConfigError
 from excite_cli.out_of_core import forget, room_of_spools
-from excite_cli.workers.base import Function, Workers
+from excite_cli.workers.base import Function, Here, Workers
 
 _place: ContextVar[Workers | None] = ContextVar("workers at hand", default=None)
 
@@ -47,3 +48,44 @@ def each(function: Function, shared: Any, tasks: Iterable[Any]) -> Iterator[Any]
 
 def _silent(word: Any) -> None:
     """Words of single tasks are not told."""
+
+
+MOST_WORKERS = 256
+
+
+def open_workers(
+    count: int = 1,
+    scheduler: str | None = None,
+    threads: int = 1,
+    warn: Callable[[str], None] = lambda text: None,
+) -> Workers:
+    """This process, `count` processes of this machine, or the dask cluster of `scheduler`.
+
+    `threads` of linear algebra for each. To be closed, best with `with`.
+
+    Raises
+    ------
+    ConfigError
+        Both are requested, or less than one, or more than `MOST_WORKERS`.
+    ClusterError, MissingExtraError
+        See `Cluster`.
+    """
+    if not 1 <= count <= MOST_WORKERS:
+        raise ConfigError(
+            f"workers: {count} cannot be started. Allowed are 1 to {MOST_WORKERS}; on more "
+            "processors, take a cluster (--scheduler)."
+        )
+    if scheduler is not None:
+        from excite_cli.workers.cluster import Cluster
+
+        if count != 1:
+            raise ConfigError(
+                "--scheduler has workers of its own, --workers are processes of this machine: "
+                "give one of them."
+            )
+        return Cluster(scheduler, threads, warn)
+    if count == 1:
+        return Here()
+    from excite_cli.workers.processes import Processes
+
+    return Processes(count, threads)

@@ -9,10 +9,10 @@ from excite_cli import Case, ConfigError, plan_after, save_config
 from excite_cli.diagnosis.answer_words import answer_in_words
 from excite_cli.diagnosis.records import Diagnosis, Textbook
 from excite_cli.diagnosis.words import no_gain_in_words
-from excite_cli.export.found_config import found_config
+from excite_cli.export.parameters import found_config
 from excite_cli.robot.model import build_robot
 from excite_cli.shown.note import Level, Note
-from excite_cli.summary.diagnosis_data import diagnosis_data
+from excite_cli.summary.diagnosis import diagnosis_data
 from tests.diagnosis.synthetic_diagnosis import CONFIG, make_diagnosis, smoke_spec
 
 TOLD = "The held-out error did not fall: 10.00% before, 10.00% after"

@@ -29,7 +29,7 @@ from excite_cli import (
     write_dataset,
     write_result,
 )
-from excite_cli.excitation.stack import Stack
+from excite_cli.excitation.objective import Stack
 from tests.api.conftest import BRIEF, SMOKE, Loop
 
 OTHER_JOINTS = "moves other joints than the config: shoulder_yaw, shoulder_pitch, elbow"

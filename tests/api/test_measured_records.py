@@ -3,8 +3,7 @@
 from html import escape
 
 from excite_cli import load_data, read_fit, read_result, simulate
-from excite_cli.shown.answer import Command, Table
-from excite_cli.shown.record import Shown
+from excite_cli.shown.answer import Command, Shown, Table
 from excite_cli.summary.diagnosis import diagnosis_answer
 from excite_cli.summary.simulation import simulation_answer
 from tests.api.conftest import Loop

@@ -13,9 +13,9 @@ import pytest
 from excite_cli.campaign import command, supervised
 from excite_cli.campaign.command import MeasureCommand
 from excite_cli.campaign.measure import NotMeasuredError, StillRunningError
-from excite_cli.campaign.measured_log import is_measured
-from excite_cli.campaign.one_at_a_time import left_in
 from excite_cli.campaign.process_table import running
+from excite_cli.campaign.same_motion import is_measured
+from excite_cli.campaign.supervised import left_in
 from excite_cli.campaign.supervisor import ProgramExit
 from tests.campaign.campaign_process import program, said, take_in, until
 

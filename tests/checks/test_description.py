@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from excite_cli.api.inspecting import inspect
 from excite_cli.api.loading import load_case
+from excite_cli.checks.all_checks import row_names, rows_of_description
 from excite_cli.checks.check_result import CheckResult
-from excite_cli.checks.rows import names, of_description
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.config.spec import Spec
 from excite_cli.robot.model import Array, build_robot
@@ -78,7 +78,7 @@ def judged(links: list[Link], **keys: Any) -> list[CheckResult]:
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "arms.urdf").write_text(urdf_of(links), encoding="utf-8")
         spec = Spec(robot=RobotSpec(urdf="arms.urdf", **keys))
-        found = of_description(build_robot(spec.robot, Path(folder)), spec)
+        found = rows_of_description(build_robot(spec.robot, Path(folder)), spec)
     return [each for each in found if each.kind != "impossible_body"]
 
 
@@ -198,12 +198,12 @@ def test_shapes_that_cannot_be_read_are_none(tmp_path: Path) -> None:
     text = urdf_of(links).replace('<box size="', '<mesh filename="missing.stl" was="', 2)
     (tmp_path / "arms.urdf").write_text(text, encoding="utf-8")
     spec = Spec(robot=RobotSpec(urdf="arms.urdf"))
-    found = of_description(build_robot(spec.robot, tmp_path), spec)
+    found = rows_of_description(build_robot(spec.robot, tmp_path), spec)
     assert [each.joints for each in found] == [("to_left_1", "to_right_1")]
     # Rows of inspect without data.
     (tmp_path / "arms.urdf").write_text(urdf_of(arms(5)), encoding="utf-8")
     found = inspect(load_case({"robot": {"urdf": str(tmp_path / "arms.urdf")}}))
-    assert tuple(each.name for each in found.results) == names()[:4]
+    assert tuple(each.name for each in found.results) == row_names()[:4]
     assert all(each.status == "ok" for each in found.results)
 
 

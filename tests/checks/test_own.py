@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from excite_cli.checks import rows
-from excite_cli.checks.all_checks import look
+from excite_cli.checks.all_checks import look, rows_in_order
 from excite_cli.checks.catalogue import CHECKS
 from excite_cli.config.load_spec import load_spec
 from excite_cli.errors import ExciteWarning
@@ -54,7 +53,7 @@ def test_the_check_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         runs = [replace(run, extra={"voltage": np.linspace(low, 48.0, len(run.t))})]
         found = look(robot, runs, prepare_all(runs, processing), SPEC)
         assert [each.evidence[: len("the supply sagged to 41 V in")] for each in found] == told
-        row = next(e for e in rows.in_order(found, True, SPEC) if e.name == "voltage of the supply")
+        row = next(e for e in rows_in_order(found, True, SPEC) if e.name == "voltage of the supply")
         assert row.status == ("fault" if told else "ok")
 
 

@@ -11,10 +11,9 @@ import pytest
 from excite_cli.checks.all_checks import look
 from excite_cli.checks.check_result import CheckResult
 from excite_cli.checks.foreign_runs import foreign_runs
-from excite_cli.checks.samples import Samples, samples_of
 from excite_cli.checks.sentences import BELONG
 from excite_cli.checks.set_up_search import _candidates, beyond_limits
-from excite_cli.checks.setup import Setup
+from excite_cli.checks.setup import Samples, Setup, samples_of
 from excite_cli.checks.textbook_fit import TextbookFit
 from excite_cli.config.commented_yaml import with_values
 from excite_cli.config.load_spec import load_spec, spec_of

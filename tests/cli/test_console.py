@@ -18,7 +18,7 @@ from excite_cli.cli.exit_status import run_guarded
 from excite_cli.cli.start_line import Best
 from excite_cli.errors import FileError
 from excite_cli.excitation.progress import Figure, Progress, ProgressMeasure, Stage
-from excite_cli.export.model_formats import MODEL_FORMATS
+from excite_cli.export.exported import MODEL_FORMATS
 from excite_cli.motion_formats.catalogue import MOTION_FORMATS
 from excite_cli.robot.overview import known_robots
 

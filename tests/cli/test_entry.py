@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
-from excite_cli.api.approach import start_posture
+from excite_cli.api.exported_chains import start_posture
 from excite_cli.cli.options import start_from
 from excite_cli.config.load_spec import load_spec
 from excite_cli.errors import ConfigError

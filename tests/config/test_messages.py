@@ -16,8 +16,8 @@ from excite_cli.config import (
     trajectory_spec,
 )
 from excite_cli.config.load_spec import MAX_BYTES, load_spec, parse_spec
+from excite_cli.config.plain_yaml import MAX_DEPTH
 from excite_cli.config.section import Section
-from excite_cli.config.strict_yaml import MAX_DEPTH
 from excite_cli.errors import ConfigError
 
 ROBOT = "robot: {urdf: arm.urdf}"

@@ -19,14 +19,13 @@ from excite_cli.config.spec import UncertaintySpec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.catalogue import build_constraints
 from excite_cli.dynamics.base_parameters import find_base_parameters
-from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty, inertia_uncertainty
+from excite_cli.dynamics.whole_robot import CenterOfMass
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.gradient_check import central_differences
-from excite_cli.proof.enclosed_motion import EnclosedMotion
-from excite_cli.proof.enclosed_trajectory import enclosed_states, intervals_of
+from excite_cli.proof.enclosed_motion import EnclosedMotion, enclosed_states, intervals_of
 from excite_cli.robot.model import Robot, build_robot
 from excite_cli.trajectory.fourier import FourierTrajectory
 from tests.robot.coupled_robots import CLAW, HAND, coupled_robot

@@ -9,8 +9,8 @@ from excite_cli.config.constraints_spec import ConstraintsSpec, ContactSpec
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.catalogue import build_constraints
-from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
+from excite_cli.dynamics.whole_robot import CenterOfMass
 from excite_cli.errors import ConfigError
 from excite_cli.robot.model import Array, Robot, build_robot
 from tests.robot.random_robots import random_robot

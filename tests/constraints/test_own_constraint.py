@@ -10,7 +10,7 @@ from excite_cli.excitation.admissible import path_of, worst_margins
 from excite_cli.excitation.inspection import Look, inspect
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
-from excite_cli.report.margin_chart import margin_charts
+from excite_cli.report.motion_chart import margin_charts
 from excite_cli.summary.result_page import margin_section, motion_section
 from excite_cli.trajectory.fade import Segment
 from excite_cli.view.instants import instants_of

@@ -8,8 +8,7 @@ from excite_cli.constraints.base import Constraint
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.excitation.admissible import verdicts
 from excite_cli.excitation.problem import Problem
-from excite_cli.proof.enclosed_motion import EnclosedMotion
-from excite_cli.proof.enclosed_trajectory import enclosed_states, intervals_of
+from excite_cli.proof.enclosed_motion import EnclosedMotion, enclosed_states, intervals_of
 from tests.excitation.smoke import CONFIG
 
 OF_FORCES = {"joint_torque", "zmp", "contact"}

@@ -15,7 +15,7 @@ from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.diagnosis.words import changes_in_words
 from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.errors import ConfigError
-from excite_cli.export.found_config import found_config
+from excite_cli.export.parameters import found_config
 from excite_cli.identification.identify import identify
 from excite_cli.measurement.covariates import with_declared
 from excite_cli.measurement.dataset import Dataset

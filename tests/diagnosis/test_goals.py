@@ -8,10 +8,10 @@ import pytest
 from excite_cli.diagnosis.expectation import expectation
 from excite_cli.diagnosis.goals import Goals
 from excite_cli.errors import ConfigError
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.run import new_result
-from excite_cli.excitation.stack import Stack
 from tests.excitation.smoke import planned, smoke
 
 KIND = "load_dependent_friction"

@@ -8,7 +8,7 @@ from scipy.linalg import null_space
 
 from excite_cli.diagnosis.modelled_run import DeclaredModel
 from excite_cli.dynamics.base_parameters import find_base_parameters
-from excite_cli.dynamics.inertial_prior import inertial_prior
+from excite_cli.dynamics.pseudo_inertia import inertial_prior
 from excite_cli.dynamics.regressor import Regressor, standard_parameters
 from excite_cli.effects.catalogue import catalogue
 from tests.robot.random_robots import random_robot

@@ -13,9 +13,9 @@ from excite_cli.diagnosis.records import Diagnosis, EffectRecord
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.errors import FileError
 from excite_cli.excitation.admissible import worst_margins
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.run import continue_run, new_result
-from excite_cli.excitation.stack import Stack
 from tests.diagnosis.synthetic_diagnosis import (
     CONFIG,
     NOISE,

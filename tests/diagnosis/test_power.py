@@ -8,8 +8,8 @@ from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.expectation import expectation, rows_as_recorded
 from excite_cli.diagnosis.power import power_of, price, sizes_shown, times_named
 from excite_cli.effects.catalogue import catalogue, kind_named
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
-from excite_cli.excitation.stack import Stack
 from tests.excitation.smoke import drawn, planned, smoke, stacked
 from tests.excitation.smoke import prediction_of as of
 

@@ -7,11 +7,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from excite_cli.config.robot_spec import RobotSpec
-from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.dynamics.regressor import InverseDynamics, standard_parameters
 from excite_cli.dynamics.row_adjoint import RowAdjoint
-from excite_cli.dynamics.whole_robot import GroundWrench, drawn_states, whole_parameters
+from excite_cli.dynamics.whole_robot import (
+    CenterOfMass,
+    GroundWrench,
+    drawn_states,
+    whole_parameters,
+)
 from excite_cli.excitation.gradient_check import central_differences, relative_error
 from excite_cli.robot.model import Robot, build_robot
 from tests.robot.random_robots import random_robot

@@ -14,7 +14,7 @@ from excite_cli import load_case, run_campaign, simulate
 from excite_cli.api.campaigning import CampaignOptions, Inbox
 from excite_cli.api.simulating import SimulationSettings
 from excite_cli.campaign import command, inbox
-from excite_cli.campaign.measured_log import record_measured
+from excite_cli.campaign.same_motion import record_measured
 from excite_cli.campaign.supervisor import ProgramExit
 from excite_cli.shown.note import Note
 from tests.campaign.campaign_process import PATIENCE, until

@@ -7,13 +7,13 @@ import numpy as np
 
 from excite_cli.api.loading import load_problem
 from excite_cli.excitation.motion import Motion
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.prediction import Prediction
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.run import continue_run, new_result
 from excite_cli.excitation.sequence import generate_motion
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
-from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.task import MotionTask
 from excite_cli.robot.model import Array
 

@@ -15,14 +15,13 @@ from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.excitation.admissible import Path as MotionPath
 from excite_cli.excitation.admissible import path_of, verdicts
-from excite_cli.excitation.inspection import Inspection, Look, inspect, mesh_check_of
-from excite_cli.excitation.mesh_verdict import mesh_verdict
+from excite_cli.excitation.inspection import Inspection, Look, inspect, mesh_check_of, mesh_verdict
 from excite_cli.excitation.nearest import closest_time, nearest_bodies
 from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.geometry.coal_distances import CoalDistances
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.geometry.mesh_check import MeshCheck
-from excite_cli.geometry.obstacle_distances import ObstacleDistances
+from excite_cli.geometry.mesh_distances import CoalDistances
+from excite_cli.geometry.obstacle_pairs import ObstacleDistances
 from excite_cli.geometry.pair_distances import PairDistances
 from excite_cli.trajectory.fade import Segment
 from tests.excitation.smoke import CONFIG, drawn, smoke

@@ -9,13 +9,12 @@ from scipy.linalg import qr
 from excite_cli.criteria.base import condition_number, singular_values
 from excite_cli.dynamics.base_parameters import base_parameters_as_given
 from excite_cli.dynamics.regressor import Regressor
-from excite_cli.excitation.dense_grid import dense_condition_number, flattered
-from excite_cli.excitation.free_design import FreeDesign
 from excite_cli.excitation.gradient_check import check_gradient
-from excite_cli.excitation.invariant import design_for, invariants
+from excite_cli.excitation.invariant import FreeDesign, design_for, invariants
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
-from excite_cli.excitation.reference_states import reference_rows, torque_metric
-from excite_cli.excitation.stack import Stack
+from excite_cli.excitation.sequence import dense_condition_number, flattered
+from excite_cli.excitation.weighting import reference_rows, torque_metric
 from tests.excitation.smoke import drawn, smoke
 
 CHOICES = ("own", "first", "last")

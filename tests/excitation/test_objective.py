@@ -31,19 +31,17 @@ from excite_cli.excitation.discrimination import (
     motions_needed,
     residual_directions,
 )
-from excite_cli.excitation.effect_columns import EffectColumns
-from excite_cli.excitation.extension import extend
+from excite_cli.excitation.effect_columns import EffectColumns, extend
 from excite_cli.excitation.gradient_check import (
     FOURTH_ORDER_STEP,
     check_gradient,
     fourth_order_differences,
     relative_error,
 )
-from excite_cli.excitation.objective import Objective
+from excite_cli.excitation.objective import Objective, Stack
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import ProgressMeasure
 from excite_cli.excitation.run import new_result
-from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.weighting import build_weighting
 from excite_cli.robot.model import Robot
 from excite_cli.trajectory.fourier import FourierTrajectory

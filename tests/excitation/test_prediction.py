@@ -8,11 +8,10 @@ import pytest
 from excite_cli.diagnosis.expectation import expectation
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.gradient_check import check_gradient
-from excite_cli.excitation.not_modelled import not_modelled
+from excite_cli.excitation.inspection import not_modelled
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.prediction import PredictedTorques
-from excite_cli.excitation.problem import Problem
-from excite_cli.excitation.stack import Stack
-from excite_cli.excitation.with_prediction import predicting
+from excite_cli.excitation.problem import Problem, predicting
 from tests.excitation.smoke import drawn, planned, smoke, stacked
 from tests.excitation.smoke import prediction_of as of
 

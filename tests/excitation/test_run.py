@@ -13,9 +13,8 @@ from excite_cli.config.spec import Spec
 from excite_cli.dynamics.regressor import Regressor
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.admissible import verdicts, worst_margins
-from excite_cli.excitation.ending import motions_within
 from excite_cli.excitation.gradient_check import check_gradient
-from excite_cli.excitation.objective import Objective
+from excite_cli.excitation.objective import Objective, Stack
 from excite_cli.excitation.problem import (
     Problem,
     acceleration_bounds,
@@ -23,12 +22,12 @@ from excite_cli.excitation.problem import (
     with_sampling,
 )
 from excite_cli.excitation.random_baseline import RandomBaseline, random_baseline
-from excite_cli.excitation.reference_states import state_bounds
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.run import new_result
-from excite_cli.excitation.stack import Stack
+from excite_cli.excitation.sequence import motions_within
+from excite_cli.excitation.weighting import state_bounds
+from excite_cli.trajectory.base import with_freedom
 from excite_cli.trajectory.catalogue import build_trajectory
-from excite_cli.trajectory.freedom import with_freedom
 from tests.excitation.smoke import planned, smoke
 
 

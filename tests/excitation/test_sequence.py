@@ -20,19 +20,18 @@ from excite_cli.config.spec import SequenceSpec
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation import one_start, sequence
 from excite_cli.excitation.motion import Motion, Outcome
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.one_start import FoundMotion, StartContext
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.progress import Figure, Progress, ProgressMeasure, Status
 from excite_cli.excitation.random_baseline import RandomBaseline, _select, random_baseline
 from excite_cli.excitation.solvers.base import Effort
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
-from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import clear_posture, random_start
 from excite_cli.excitation.task import MotionTask
 from excite_cli.store.result_file import read_result
-from excite_cli.workers.base import Workers
-from excite_cli.workers.catalogue import open_workers
-from excite_cli.workers.here import Here
+from excite_cli.workers.base import Here, Workers
+from excite_cli.workers.context import open_workers
 from excite_cli.workers.processes import Processes
 from tests.excitation.smoke import drawn, planned, smoke, task_of
 

@@ -18,14 +18,13 @@ from excite_cli.excitation.base_motion import (
     lowest,
 )
 from excite_cli.excitation.motion import Outcome
+from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.progress import Progress, ProgressMeasure, Status
-from excite_cli.excitation.residuals import REACH
 from excite_cli.excitation.solvers.base import Effort, Solver
 from excite_cli.excitation.solvers.interior_point import InteriorPoint, damped_update
-from excite_cli.excitation.stack import Stack
 from excite_cli.excitation.start import clear_posture, random_start
-from excite_cli.excitation.task import MotionTask
+from excite_cli.excitation.task import REACH, MotionTask
 from tests.excitation.slsqp import BestAdmissible, ScipySlsqp
 from tests.excitation.smoke import task_of
 

@@ -5,7 +5,7 @@ import pytest
 
 from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.base_motion import base_motion
-from excite_cli.excitation.planned_prior import planned_stack
+from excite_cli.excitation.run import planned_stack
 from excite_cli.excitation.start import clear_posture, random_direction, random_start, start_from
 from excite_cli.excitation.task import MotionTask
 from excite_cli.trajectory.bspline import BSplineTrajectory

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from excite_cli.config.data_spec import EffectSpec
-from excite_cli.export import mjcf_actuators
 from excite_cli.export.mjcf import mjcf
 from excite_cli.robot.model import Robot
 from tests.export.drives import KD, KP, LIMIT, drive, identified, ur10
@@ -74,7 +73,7 @@ def test_set_points_act_late(robot: Robot, step: float) -> None:
 def test_a_mujoco_without_delays_has_the_number(
     robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(mjcf_actuators, "_knows_delays", lambda: False)
+    monkeypatch.setattr("excite_cli.export.mjcf._knows_delays", lambda: False)
     exported = mjcf(robot, identified(robot), drive(delay=0.01))
     assert "<!-- A set point acts 0.01 s after it was sent" in exported.text
     assert any("no delays: delay ctrl by 0.01 s yourself" in note for note in exported.notes)

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from excite_cli.config.robot_spec import RobotSpec
-from excite_cli.geometry.hull_bounds import ball_bounds, hull_bounds
 from excite_cli.geometry.link_meshes import Poses, link_meshes
 from excite_cli.geometry.mesh_check import MeshCheck
 from excite_cli.geometry.mesh_distances import MeshDistances
+from excite_cli.geometry.mesh_pairs import RelativeReach, ball_bounds, hull_bounds
 from excite_cli.geometry.reasons import ContactMeaning
-from excite_cli.geometry.relative_reach import RelativeReach
 from excite_cli.robot.model import Array, Robot, build_robot
 from tests.geometry.mesh_cover import uncovered_links
 from tests.robot.coupled_robots import CLAW, coupled_robot

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from excite_cli.config.robot_spec import RobotSpec
-from excite_cli.constraints.mesh_clearance import KEPT, MeshClearance
+from excite_cli.constraints.self_collision import KEPT, MeshClearance
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.geometry.collision_pairs import CollisionPairs
 from excite_cli.geometry.mesh_distances import MeshDistances
-from excite_cli.geometry.pair_table import PairTable
+from excite_cli.geometry.mesh_pairs import PairTable
 from excite_cli.geometry.pair_tables import FAR, mesh_tables, near_at_posture
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot, build_robot

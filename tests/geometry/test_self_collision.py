@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from excite_cli.constraints.self_collision import Clearance
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
-from excite_cli.geometry.coal_distances import Array, CoalDistances
 from excite_cli.geometry.collision_pairs import CollisionPairs
+from excite_cli.geometry.mesh_distances import Array, CoalDistances
 from excite_cli.geometry.world_segments import nearest_points, normals
 from excite_cli.robot.capsule import Capsule
 

@@ -24,7 +24,7 @@ from excite_cli.identification.carried_load import expected_load
 from excite_cli.identification.stored_model import StoredFit
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.store.fit_file import read_fit
-from excite_cli.summary.load import load_answer
+from excite_cli.summary.identification import load_answer
 from tests.cli.program import SMOKE, Program
 
 pytest.importorskip("mujoco")

@@ -6,10 +6,11 @@ from scipy.optimize import minimize
 
 from excite_cli.config.data_spec import EffectSpec, IdentificationSpec
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
-from excite_cli.dynamics.inertial_prior import InertialPrior, inertial_prior
 from excite_cli.dynamics.pseudo_inertia import (
     BASIS,
+    InertialPrior,
     body_lengths,
+    inertial_prior,
     pseudo_inertias,
     smallest_eigenvalues,
 )

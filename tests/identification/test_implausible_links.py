@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from excite_cli.config.robot_spec import RobotSpec
-from excite_cli.dynamics.inertial_prior import inertial_prior
+from excite_cli.dynamics.pseudo_inertia import inertial_prior
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.identification import implausible_links
 from excite_cli.identification.implausible_links import implausible, marked

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from excite_cli.config.load_spec import load_spec
-from excite_cli.dynamics.inertial_prior import InertialPrior, inertial_prior
+from excite_cli.dynamics.pseudo_inertia import InertialPrior, inertial_prior
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.identification.identify import Identification, identify
 from excite_cli.identification.link_changes import inertial_covariance, link_changes

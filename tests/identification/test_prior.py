@@ -5,7 +5,7 @@ import pytest
 
 from excite_cli.config.data_spec import IdentificationSpec
 from excite_cli.dynamics.base_parameters import find_base_parameters
-from excite_cli.dynamics.inertial_prior import inertial_prior
+from excite_cli.dynamics.pseudo_inertia import inertial_prior
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.identification.prior import prior_of
 from tests.robot.random_robots import random_robot

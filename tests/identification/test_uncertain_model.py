@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
-from excite_cli.dynamics.inertial_prior import InertialPrior, inertial_prior
-from excite_cli.dynamics.pseudo_inertia import body_lengths, smallest_eigenvalues
+from excite_cli.dynamics.pseudo_inertia import (
+    InertialPrior,
+    body_lengths,
+    inertial_prior,
+    smallest_eigenvalues,
+)
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.coulomb_friction import CoulombFriction
 from excite_cli.errors import ConfigError

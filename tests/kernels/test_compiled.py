@@ -15,11 +15,11 @@ from excite_cli.dynamics import forward_kinematics, spatial_adjoint
 from excite_cli.dynamics.forward_kinematics import BatchKinematics
 from excite_cli.dynamics.regressor import Regressor
 from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint
-from excite_cli.excitation import residuals
-from excite_cli.excitation.residuals import ResidualDerivatives, squared_per_instant
+from excite_cli.excitation import task
+from excite_cli.excitation.task import ResidualDerivatives, squared_per_instant
 from excite_cli.geometry import pair_distances
+from excite_cli.geometry.mesh_pairs import PairTable
 from excite_cli.geometry.pair_distances import PairDistances
-from excite_cli.geometry.pair_table import PairTable
 from excite_cli.kernels import compiled as kernels
 from excite_cli.kernels.compiled import KERNELS
 from excite_cli.robot.capsule import Capsule
@@ -136,7 +136,7 @@ def test_squares_per_instant(monkeypatch: pytest.MonkeyPatch) -> None:
     parts = (rng.normal(size=(40, 3)), None, rng.normal(size=(40, 3)))
     rows, weights = ResidualDerivatives(times, np.zeros(40, int), parts), rng.uniform(size=40)
     compiled = squared_per_instant(rows, weights, 8)
-    monkeypatch.setattr(residuals, "KERNELS", None)
+    monkeypatch.setattr(task, "KERNELS", None)
     plain = squared_per_instant(rows, weights, 8)
     assert compiled.keys() == plain.keys()
     for pair in plain:

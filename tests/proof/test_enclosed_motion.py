@@ -8,14 +8,12 @@ from hypothesis import strategies as st
 
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty, Piece
 from excite_cli.dynamics.whole_robot import whole_parameters
-from excite_cli.geometry.obstacle_distances import ObstacleDistances
+from excite_cli.geometry.obstacle_pairs import ObstacleDistances
 from excite_cli.geometry.obstacles import Box, Plane
 from excite_cli.geometry.pair_distances import PairDistances
-from excite_cli.proof.enclosed_distances import EnclosedCapsules
-from excite_cli.proof.enclosed_motion import EnclosedMotion
-from excite_cli.proof.enclosed_obstacles import least_clearances
+from excite_cli.proof.enclosed_distances import EnclosedCapsules, least_clearances
+from excite_cli.proof.enclosed_motion import EnclosedMotion, enclosed_states, intervals_of
 from excite_cli.proof.enclosed_rows import combined, ground_rows, least_of, mass_rows, torque_rows
-from excite_cli.proof.enclosed_trajectory import enclosed_states, intervals_of
 from excite_cli.proof.taylor import Taylor
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot

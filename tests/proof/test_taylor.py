@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from excite_cli.proof.enclosed_trajectory import enclosed_states, intervals_of
+from excite_cli.proof.enclosed_motion import enclosed_states, intervals_of
 from excite_cli.proof.taylor import (
     Taylor,
     applied,

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli.proposal.assumed_limits import JointPlan, plan_limits
-from excite_cli.proposal.timing import choose_pace
+from excite_cli.proposal.assumed_limits import JointPlan, choose_pace, plan_limits
 from tests.proposal.robots import GOOD, arm, joint, link, surveyed, written
 
 

@@ -11,9 +11,9 @@ from excite_cli.excitation.start import clear_posture
 from excite_cli.excitation.task import MotionTask
 from excite_cli.proposal.joints import limbs
 from excite_cli.proposal.propose import Request, propose
+from excite_cli.proposal.shapes import reference_posture, srdf_near
 from excite_cli.robot.allowed_files import OutsideError
 from excite_cli.robot.description import EXAMPLE_PREFIX, load_description
-from excite_cli.robot.srdf import reference_posture, srdf_near
 from excite_cli.robot.urdf_joints import survey
 from tests.proposal.robots import GOOD, TETRAHEDRON, arm, joint, link, serial, written
 from tests.summary.two_arms import two_arms

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from excite_cli.report.plot import Curve, Panel, Plot, merged
-from excite_cli.report.plot_figure import draw_plots
-from excite_cli.report.style import VERMILION, WIDTH
+from excite_cli.report.plot_figure import VERMILION, WIDTH, draw_plots
 
 X = np.linspace(0.0, 4.0, 9)
 BROKEN = np.where(X == 2.0, np.nan, X**2)

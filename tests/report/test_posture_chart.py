@@ -8,9 +8,10 @@ import pytest
 from excite_cli.api.loading import load_problem
 from excite_cli.constraints.self_collision import SelfCollision
 from excite_cli.excitation.nearest import closest_time
-from excite_cli.geometry.coal_distances import CoalDistances
+from excite_cli.geometry.mesh_distances import CoalDistances
 from excite_cli.report.chart import in_figures
-from excite_cli.report.posture_chart import posture_chart
+from excite_cli.report.posture_chart import posture_chart, robot_chart
+from excite_cli.robot.tree import Skeleton
 from excite_cli.trajectory.fade import Segment
 from tests.cli.program import SMOKE
 from tests.report.case import Case
@@ -79,3 +80,41 @@ def test_a_floor_is_drawn_where_it_is(case: Case, svg: str) -> None:
         robot = [float(each[1]) for each in PATH.findall(chart.svg) if each[5] != "0.8"]
         found.append((middle - max(robot)) / _scale(chart.svg, kept))
     assert found[1] - found[0] == pytest.approx(0.3 * np.cos(np.deg2rad(18)), rel=0.1)
+
+
+ARM = Skeleton(
+    base=(0.0, 0.0, 0.0),
+    joints=((0.0, 0.0, 0.3), (0.2, 0.0, 0.6), (0.5, 0.1, 0.6)),
+    parents=(-1, 0, 1),
+    tips=((0.0, 0.0, 0.3), (0.2, 0.0, 0.6), (0.7, 0.1, 0.5)),
+)
+
+
+def test_joints_have_names_shares_and_colours() -> None:
+    shares = {"a<b>": 0.02, "b": 0.08, "c": float("nan")}
+    chart = robot_chart("Robot", ARM, tuple(shares), shares, "Error of the torque")
+    assert "a&lt;b&gt; 2.0%" in chart.svg
+    assert "c –" in chart.svg
+    colours = re.findall(r"<circle[^>]*fill: ([^;]*);", chart.svg)
+    assert colours == [
+        "color-mix(in oklab, var(--vermilion) 25%, var(--green))",
+        "color-mix(in oklab, var(--vermilion) 100%, var(--green))",
+        "var(--muted)",
+    ]
+    assert chart.alternative.index("b 8.0%") < chart.alternative.index("a<b> 2.0%")
+
+
+def test_it_stays_within_its_drawing_with_many_joints() -> None:
+    n = 40
+    chain = Skeleton(
+        (0.0, 0.0, 0.0),
+        tuple((0.1 * k, 0.0, 0.2 * k) for k in range(n)),
+        tuple(range(-1, n - 1)),
+        tuple((0.1 * k, 0.0, 0.2 * k) for k in range(n)),
+    )
+    names = [f"joint_{k}" for k in range(n)]
+    chart = robot_chart("Robot", chain, names, dict.fromkeys(names, 0.1), "Error")
+    width, height = map(float, re.search(r'viewBox="0 0 (\S+) (\S+)"', chart.svg).groups())  # type: ignore[union-attr]
+    for x, y in re.findall(r'cx="([\d.-]+)" cy="([\d.-]+)"', chart.svg):
+        assert 0 < float(x) < width
+        assert 0 < float(y) < height

@@ -8,9 +8,9 @@ import pytest
 from excite_cli.config.constraints_spec import SelfCollisionSpec
 from excite_cli.config.robot_spec import PayloadSpec, RobotSpec
 from excite_cli.dynamics.base_parameters import find_base_parameters
-from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.dynamics.regressor import InverseDynamics, payload_parameters, standard_parameters
+from excite_cli.dynamics.whole_robot import CenterOfMass
 from excite_cli.errors import ConfigError
 from excite_cli.export.mjcf import mjcf
 from excite_cli.export.urdf import updated_urdf

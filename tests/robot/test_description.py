@@ -11,17 +11,16 @@ import pytest
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import MissingExtraError, RobotError
 from excite_cli.geometry.link_shapes import collision_model, placed_shapes
-from excite_cli.robot import descriptions_package
+from excite_cli.robot import ros_packages
 from excite_cli.robot.description import (
     RobotDescription,
     example_robots,
     example_robots_folder,
     load_description,
 )
-from excite_cli.robot.descriptions_package import find_description
-from excite_cli.robot.mesh_paths import MeshFiles, unusable
+from excite_cli.robot.mesh_paths import MeshFiles, needed_folders, unusable
 from excite_cli.robot.model import build_robot
-from excite_cli.robot.package_search import needed_folders
+from excite_cli.robot.ros_packages import find_description
 from tests.proposal.robots import GOOD, arm, joint, link, written
 
 
@@ -55,7 +54,7 @@ XACRO = (
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A package with a URDF, a xacro with arguments, one that cannot be fetched, one of nothing."""
-    monkeypatch.setattr(descriptions_package, "_PACKAGE", "some_descriptions")
+    monkeypatch.setattr(ros_packages, "_PACKAGE", "some_descriptions")
     folder, clone = tmp_path / "site" / "some_descriptions", tmp_path / "clone" / "arm"
     folder.mkdir(parents=True)
     clone.mkdir(parents=True)
@@ -105,7 +104,7 @@ def test_what_cannot_be_had_is_told_with_a_way_on(package: Path, name: str, word
 
 
 def test_without_the_package_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(descriptions_package, "_PACKAGE", "no_descriptions")
+    monkeypatch.setattr(ros_packages, "_PACKAGE", "no_descriptions")
     find_description.cache_clear()
     with pytest.raises(MissingExtraError, match="Install it with pip, or give a file"):
         load_description("robot_descriptions:ur10e_description")

@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from excite_cli.config.limit_presets import LIMIT_PRESETS
-from excite_cli.config.robot_spec import JointLimits, RobotSpec
+from excite_cli.config.robot_spec import LIMIT_PRESETS, JointLimits, RobotSpec
 from excite_cli.errors import ConfigError
 from excite_cli.robot.model import Robot, build_robot
 

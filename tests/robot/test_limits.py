@@ -26,9 +26,8 @@ from excite_cli.excitation.problem import build_problem
 from excite_cli.proposal.assumed_limits import plan_limits
 from excite_cli.proposal.joints import choose_joints
 from excite_cli.proposal.propose import Proposal, Request, propose
-from excite_cli.robot.carried_bodies import MovedBodies
 from excite_cli.robot.description import load_description
-from excite_cli.robot.link_frame import leaves, link_frame, own_link
+from excite_cli.robot.link_frame import MovedBodies, leaves, link_frame, own_link
 from excite_cli.robot.model import Robot, build_robot
 from excite_cli.robot.overview import describe
 from excite_cli.robot.tree import skeleton_of

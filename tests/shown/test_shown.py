@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import pytest
 
-from excite_cli.shown.answer import Command, Table
+from excite_cli.shown.answer import Command, Shown, Table, as_html, show
 from excite_cli.shown.note import Level, Note, log_note, saying
-from excite_cli.shown.record import Shown, as_html, show
 
 
 @dataclass(frozen=True, repr=False)

@@ -13,7 +13,7 @@ from excite_cli.config.load_spec import load_spec
 from excite_cli.criteria.base import singular_values
 from excite_cli.errors import MissingExtraError
 from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.report.style import matplotlib_part, new_figure, save_figure, save_pages
+from excite_cli.report.plot_figure import matplotlib_part, new_figure, save_figure, save_pages
 from excite_cli.summary.figures import result_figures
 from tests.report.case import Case
 

@@ -11,8 +11,8 @@ from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.identification.identify import identify
 from excite_cli.identification.stored_model import StoredFit
+from excite_cli.report.error_chart import parameter_charts
 from excite_cli.report.page import render
-from excite_cli.report.parameter_chart import parameter_charts
 from excite_cli.shown.answer import Choice, Page, Table
 from excite_cli.store.fit_file import read_fit, write_fit
 from excite_cli.summary.identification import (

@@ -15,8 +15,7 @@ from excite_cli.shown.answer import Detail, Section
 from excite_cli.store.codec import read_record, write_record
 from excite_cli.summary import diagnosis
 from excite_cli.summary.assembly import Source, page_of
-from excite_cli.summary.diagnosis import diagnosis_answer
-from excite_cli.summary.diagnosis_data import diagnosis_data
+from excite_cli.summary.diagnosis import diagnosis_answer, diagnosis_data
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis
 from tests.report.structure import Structure
 

@@ -38,8 +38,7 @@ from excite_cli.measurement.run_identity import Origin
 from excite_cli.scoring.changes import Change
 from excite_cli.scoring.records import ScoredRun
 from excite_cli.scoring.thresholds import Thresholds
-from excite_cli.shown.answer import Answer, Table
-from excite_cli.shown.record import Shown, _found
+from excite_cli.shown.answer import Answer, Shown, Table, _found
 from excite_cli.summary.motions import result_parts
 from excite_cli.workers.base import Workers
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis, smoke_spec

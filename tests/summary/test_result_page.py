@@ -9,7 +9,7 @@ import pytest
 from excite_cli.api.loading import load_problem
 from excite_cli.config.load_spec import parse_spec, spec_as_yaml
 from excite_cli.criteria.base import singular_values
-from excite_cli.excitation.stack import Stack
+from excite_cli.excitation.objective import Stack
 from excite_cli.report.chart import in_figures
 from excite_cli.report.condition_chart import condition_chart, random_stack
 from excite_cli.report.page import render

@@ -12,8 +12,8 @@ from excite_cli.trajectory.base import Trajectory
 from excite_cli.trajectory.bspline import BSplineTrajectory
 from excite_cli.trajectory.fade import Chain, Segment
 from excite_cli.trajectory.fourier import FourierTrajectory
+from excite_cli.trajectory.point_to_point import Slowed
 from excite_cli.trajectory.sampled import SampledTrajectory, through_samples
-from excite_cli.trajectory.slowed import Slowed
 
 Array = np.ndarray
 

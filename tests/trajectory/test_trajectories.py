@@ -7,10 +7,9 @@ from hypothesis import strategies as st
 
 from excite_cli.config.trajectory_spec import BSplineSpec, FourierSpec
 from excite_cli.excitation.gradient_check import central_differences, relative_error
-from excite_cli.trajectory.base import Trajectory
+from excite_cli.trajectory.base import Trajectory, harmonics_for, with_freedom
 from excite_cli.trajectory.bspline import BSplineTrajectory
 from excite_cli.trajectory.fourier import FourierTrajectory
-from excite_cli.trajectory.freedom import harmonics_for, with_freedom
 
 FAMILIES: list[Trajectory] = [
     FourierTrajectory(harmonics=4, base_frequency=0.9),

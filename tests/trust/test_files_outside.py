@@ -11,11 +11,10 @@ import pytest
 from benchmarks.trust.robot_files import VALID
 from excite_cli.errors import RobotError
 from excite_cli.proposal.propose import Request, propose
+from excite_cli.proposal.shapes import srdf_near
 from excite_cli.robot.allowed_files import OutsideError, needed, own_folder
 from excite_cli.robot.description import load_description
-from excite_cli.robot.mesh_paths import Kind, check_mesh_paths, located
-from excite_cli.robot.package_search import load_with_folders
-from excite_cli.robot.srdf import srdf_near
+from excite_cli.robot.mesh_paths import Kind, check_mesh_paths, load_with_folders, located
 from tests.trust.conftest import XACRO
 
 STL = VALID["stl"]

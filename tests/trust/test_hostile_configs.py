@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from excite_cli.config.load_spec import load_spec
-from excite_cli.config.strict_yaml import LONGEST_NUMBER, MAX_VALUES
+from excite_cli.config.plain_yaml import LONGEST_NUMBER, MAX_VALUES
 from excite_cli.excitation.problem import with_sampling
 from excite_cli.trajectory.catalogue import build_trajectory
 from tests.trust.refusals import refused

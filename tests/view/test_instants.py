@@ -3,10 +3,10 @@ import pytest
 
 from excite_cli.constraints.obstacle_clearance import Surroundings
 from excite_cli.constraints.self_collision import SelfCollision
-from excite_cli.dynamics.center_of_mass import CenterOfMass
 from excite_cli.dynamics.forward_kinematics import States
+from excite_cli.dynamics.whole_robot import CenterOfMass
 from excite_cli.excitation.problem import Problem
-from excite_cli.geometry.coal_distances import CoalDistances
+from excite_cli.geometry.mesh_distances import CoalDistances
 from excite_cli.trajectory.fade import Segment
 from excite_cli.view.instants import Instants, instants_of
 

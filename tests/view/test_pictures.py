@@ -9,13 +9,13 @@ import pytest
 from excite_cli.excitation.problem import Problem
 from excite_cli.trajectory.fade import Segment
 from excite_cli.view import pictures
-from excite_cli.view.camera import fitted_camera
 from excite_cli.view.instants import instants_of
 from excite_cli.view.pictures import View, motion_gif, still_png
+from excite_cli.view.rays import fitted_camera
 from excite_cli.view.scene import build_scene
 from excite_cli.view.studio import QUICK, Studio
 from excite_cli.workers.base import Workers
-from excite_cli.workers.catalogue import open_workers
+from excite_cli.workers.context import open_workers
 
 pytest.importorskip("embreex")
 Image = pytest.importorskip("PIL.Image")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from excite_cli.view.camera import fitted_camera
+from excite_cli.view.rays import fitted_camera
 from excite_cli.view.surface import (
     Triangles,
     ball_profile,

@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 
 from excite_cli.errors import ConfigError, NoAdmissibleMotionError
-from excite_cli.workers.base import LostWorkersError, News, NoWorkersError, Workers
-from excite_cli.workers.catalogue import open_workers
-from excite_cli.workers.here import Here
+from excite_cli.workers.base import Here, LostWorkersError, News, NoWorkersError, Workers
+from excite_cli.workers.context import open_workers
 from excite_cli.workers.processes import Processes
 from tests.workers import work
 

@@ -33,14 +33,14 @@ from excite_cli.errors import NoAdmissibleMotionError
 from excite_cli.excitation.motion import Outcome
 from excite_cli.excitation.objective import Evaluation, Spectrum
 from excite_cli.excitation.progress import ProgressCallback, Stage, Status
-from excite_cli.excitation.residuals import (
+from excite_cli.excitation.solvers.base import CutShortError, Effort, Solver
+from excite_cli.excitation.task import (
     REACH,
+    MotionTask,
     ResidualDerivatives,
     squared_per_instant,
     summed_per_instant,
 )
-from excite_cli.excitation.solvers.base import CutShortError, Effort, Solver
-from excite_cli.excitation.task import MotionTask
 
 # Damped BFGS: an update of the Hessian that stays positive definite (Powell 1978).
 

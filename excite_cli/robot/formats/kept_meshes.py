@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.atomic import write_atomically
-from excite_cli.cache_folder import cache_folder
+from excite_cli.disk_cache import cache_folder
 from excite_cli.errors import FileError, RobotError
 
 

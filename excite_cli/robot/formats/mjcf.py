@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from excite_cli.errors import MissingExtraError, RobotError
 from excite_cli.robot.allowed_files import allowed_files
-from excite_cli.robot.formats.base import ConversionRequest, RobotFormat, Urdf
-from excite_cli.robot.formats.mjcf_sources import Ranges, compiled, mjcf_sources
-from excite_cli.robot.formats.urdf_parts import (
+from excite_cli.robot.formats.base import (
+    ConversionRequest,
+    RobotFormat,
+    Urdf,
     add_inertial,
     add_origin,
     add_shape,
@@ -28,6 +29,7 @@ from excite_cli.robot.formats.urdf_parts import (
     mesh,
     words,
 )
+from excite_cli.robot.formats.mjcf_sources import Ranges, compiled, mjcf_sources
 from excite_cli.robot.loops import TAG
 from excite_cli.robot.urdf_check import root_tag
 

@@ -17,8 +17,10 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from excite_cli.errors import RobotError
-from excite_cli.robot.formats.base import ConversionRequest, RobotFormat, Urdf
-from excite_cli.robot.formats.urdf_parts import (
+from excite_cli.robot.formats.base import (
+    ConversionRequest,
+    RobotFormat,
+    Urdf,
     add_inertial,
     add_origin,
     add_shape,

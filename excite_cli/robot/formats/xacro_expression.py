@@ -98,20 +98,8 @@ _MATH: dict[str, Any] = {
     name: getattr(math, name)
     for name in (
         *("acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "ceil", "copysign", "cos"),
-        *(
-            "cosh",
-            "degrees",
-            "dist",
-            "e",
-            "exp",
-            "fabs",
-            "floor",
-            "fmod",
-            "fsum",
-            "gcd",
-            "hypot",
-            "inf",
-        ),
+        *("cosh", "degrees", "dist", "e", "exp", "fabs", "floor", "fmod", "fsum", "gcd"),
+        *("hypot", "inf"),
         *("isclose", "isfinite", "isinf", "isnan", "log", "log10", "log2", "modf", "nan", "pi"),
         *("pow", "radians", "remainder", "sin", "sinh", "sqrt", "tan", "tanh", "tau", "trunc"),
     )

@@ -14,7 +14,7 @@ from excite_cli.geometry.capsules import fit_capsules
 from excite_cli.geometry.link_shapes import collision_model, link_shapes
 from excite_cli.geometry.mesh_distances import MeshDistances
 from excite_cli.robot.description import load_description
-from excite_cli.robot.mimic import Mimic
+from excite_cli.robot.loops import Mimic
 from excite_cli.robot.model import Robot, build_robot
 
 ODD = Path(__file__).parent / "odd_arm.xml"

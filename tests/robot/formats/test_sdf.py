@@ -9,8 +9,7 @@ from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import RobotError
 from excite_cli.geometry.link_shapes import collision_model, placed_shapes
 from excite_cli.robot.description import RobotDescription, load_description
-from excite_cli.robot.loops import Loop
-from excite_cli.robot.mimic import Mimic
+from excite_cli.robot.loops import Loop, Mimic
 from excite_cli.robot.model import build_robot
 
 
