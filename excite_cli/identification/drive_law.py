@@ -1,4 +1,4 @@
-"""What nobody told of the law of position-controlled drives: its delay, and its gains.
+"""What is not given of the law of position-controlled drives: its delay, limits, and gains.
 
 The law's torque must be that of the textbook's model. With e(d) the distance of set points from
 positions, when these act d later, Y φ the rigid bodies, F f viscous and Coulomb friction, offset
@@ -11,16 +11,16 @@ comes later looks like less of a rotor. d minimises Σ_j n_j log RSS_j(d) / 2, i
 is that of leaving out a tenth of the time each (jackknife). That of when a set point comes between
 two samples is told with it (`hold_std`).
 
-*Limits* that nobody told: of a drive that gives no more than L the law holds the excess besides,
-τ_j − clip(τ_j, ±L). Its column fits beside the model where there is such a limit, with a size of 1
-and much less left of the joint.
+*Limits.* A drive that saturates at L gives clip(τ_j, ±L). L minimises what the textbook's model
+leaves of that torque, as a share of it, over quantiles of |τ_j|; it is taken if the share falls to
+half and the model asks for L, too, where it is reached.
 
 *Gains.* All of kp, φ and f times one factor fit as well, so the noise is taken to be one of e, and
 what the description says of its masses (`inertial_prior`, 30 %) tells the factor:
 
-    min over φ, f, κ = log kp of  Σ_j n_j log ‖e_j − ((Y φ)_j + F_j f_j) exp(−κ_j)‖ + prior(φ),
+    min over φ, f, κ = log kp of  Σ_j n_j log ‖e_j − ((Y φ)_j + F_j f_j) exp(−κ_j)‖ + prior(φ, κ)
 
-n_j the samples that count, fewer than there are where what is left varies slowly, and the drives'
+(`drive_gains`), n_j the samples that count, fewer than there are where what is left varies slowly, and the drives'
 gains taken to be in proportion to the joints' largest torques within a factor of 1.8 (one standard
 deviation): of a joint that carries little, friction and rotor take up what its gain would be.
 """
