@@ -20,9 +20,10 @@ what the description says of its masses (`inertial_prior`, 30 %) tells the facto
 
     min over φ, f, κ = log kp of  Σ_j n_j log ‖e_j − ((Y φ)_j + F_j f_j) exp(−κ_j)‖ + prior(φ, κ)
 
-(`drive_gains`), n_j the samples that count, fewer than there are where what is left varies slowly, and the drives'
-gains taken to be in proportion to the joints' largest torques within a factor of 1.8 (one standard
-deviation): of a joint that carries little, friction and rotor take up what its gain would be.
+(`drive_gains`), n_j the samples that count, fewer than there are where what is left varies slowly,
+and the gains taken to be in proportion to the joints' largest torques within a factor of 1.8 (one
+standard deviation): of a joint that carries little, friction and rotor take up what its gain would
+be.
 """
 
 from collections.abc import Callable, Sequence
