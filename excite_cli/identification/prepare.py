@@ -21,7 +21,7 @@ from excite_cli.identification.averages import (
 )
 from excite_cli.identification.declared_states import LeftOut
 from excite_cli.identification.processing import Processing
-from excite_cli.measurement.dataset import Array, Finding, Run
+from excite_cli.measurement.dataset import Array, Finding, Run, TorqueLaw
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.out_of_core import Spool
 from excite_cli.workers.base import Tell
@@ -180,9 +180,7 @@ def prepare(run: Run, processing: Processing, left_out: LeftOut = LeftOut()) -> 
         covariates={name: values[keep] for name, values in run.covariates.items()},
         before=past[len(past) % stride :: stride],
         rounding=() if run.torque_step is None else tuple(each.rounding for each in fit),
-        unsure=np.stack([e.unsure for e in fit if e.unsure is not None], axis=2)
-        if unsure
-        else None,
+        unsure=_unsure(law, fit),
     )
 
 
@@ -253,10 +251,13 @@ def _averaged(
     return _JointAverages(own, np.asarray(full @ tau[:, j]), there, rounding, unsure)
 
 
-def _stacked(changes: Sequence[Array | None]) -> Array | None:
-    """Those of all joints, (u, M, n)."""
-    there = [change for change in changes if change is not None]
-    return np.stack(there, axis=2) if there else None
+def _unsure(law: TorqueLaw | None, joints: Sequence[_JointAverages]) -> Array | None:
+    """Changes of the averages of all joints, (u, M, n), by what the law is unsure of."""
+    shifts = [joint.unsure for joint in joints if joint.unsure is not None]
+    if law is None or not shifts:
+        return None
+    averaged = np.stack([joint.tau for joint in joints], axis=1)
+    return np.concatenate([np.stack(shifts, axis=2), law.by_gains(averaged)])
 
 
 def smoothed(run: Run, processing: Processing) -> Array:

@@ -31,7 +31,10 @@ class TorqueLaw(Protocol):
         """The run with the torque at smoothed positions q (T, n)."""
 
     def unsure(self, run: "Run") -> list[Array]:
-        """Changes of τ (T, n) by one standard deviation of each figure of the law."""
+        """Changes of τ (T, n) by one standard deviation of each figure that shifts it in time."""
+
+    def by_gains(self, tau: Array) -> Array:
+        """Changes (k, M, n) of averaged torques τ (M, n) by one of what scales them."""
 
 
 @dataclass(frozen=True)

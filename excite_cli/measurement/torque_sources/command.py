@@ -66,14 +66,18 @@ class DriveLaw:
         return replace(run, tau=run.tau + self.torque(smooth) - self.torque(run))
 
     def unsure(self, run: Run) -> list[Array]:
-        """Changes of τ (T, n) by one standard deviation: of the delay, of ε, and of gains."""
+        """Changes of τ (T, n) by one standard deviation: of the delay, and of ε."""
         later = self.delay + math.hypot(self.delay_std, hold_std(run))
         others, own = (replace(self, delay=later), replace(self, lag=0.0)), self.torque(run)
-        changes = [law.torque(run) - own for law in others]
-        if self.gain_half is not None:
-            for change in self.gain_half.T:
-                changes.append(np.zeros_like(own))
-                changes[-1][:, run.base_rows :] = own[:, run.base_rows :] * change
+        return [law.torque(run) - own for law in others]
+
+    def by_gains(self, tau: Array) -> Array:
+        """Changes (k, M, n) of torques τ (M, n) by one standard deviation of gains, if found."""
+        if self.gain_half is None:
+            return np.zeros((0, *tau.shape))
+        count = len(self.gain_half)
+        changes = np.zeros((count, *tau.shape))
+        changes[:, :, -count:] = tau[:, -count:] * self.gain_half.T[:, None, :]
         return changes
 
 

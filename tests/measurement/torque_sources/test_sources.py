@@ -12,7 +12,7 @@ from excite_cli.errors import ConfigError, FileError
 from excite_cli.measurement.dataset import Run
 from excite_cli.measurement.torque import check_joints, to_joints
 from excite_cli.measurement.torque_sources.catalogue import TORQUE_SOURCES, torque_source
-from excite_cli.measurement.torque_sources.command import held, law_of
+from excite_cli.measurement.torque_sources.command import DriveLaw, held, hold_std, law_of
 from tests.measurement.recordings import JOINTS, check, motion, only, read, recorded
 
 TURNS = np.ones(3, bool)
@@ -162,3 +162,22 @@ def test_gains_of_all_joints_or_none() -> None:
         check_joints(MeasurementSpec(torque="command", command={"kp": {"shoulder": 2.0}}), JOINTS)
     with pytest.raises(ConfigError, match=r"measurement.command.kd: 'elbo' is not a moved joint"):
         check_joints(MeasurementSpec(torque="command", command={"kd": {"elbo": 2.0}}), JOINTS)
+
+
+def test_what_gains_are_unsure_of_scales_the_torques_of_driven_joints() -> None:
+    """Of a base of one row before two drives, whose gains have errors in common."""
+    half = np.array([[0.1, 0.0], [0.1, 0.2]])
+    law = DriveLaw(np.ones(2), np.zeros(2), np.full(2, np.inf), 0.0, gain_half=half)
+    changes = law.by_gains(np.array([[7.0, 1.0, -2.0]]))
+    assert changes == pytest.approx(np.array([[[0.0, 0.1, -0.2]], [[0.0, 0.0, -0.4]]]))
+    assert len(replace(law, gain_half=None).by_gains(np.ones((1, 3)))) == 0
+
+
+def test_when_a_set_point_came_between_samples_is_uncertain_by_half_a_step() -> None:
+    t = np.arange(100) * 0.02
+    run = Run("r", t, np.zeros((100, 1)), np.zeros((100, 1)), extra={"q_cmd": t[:, None]})
+    law = DriveLaw(np.array([50.0]), np.zeros(1), np.full(1, np.inf), 0.0, lag=5e-4)
+    by_delay, by_loop = law.unsure(run)
+    assert hold_std(run) == pytest.approx(0.01 / np.sqrt(12.0))  # uniform on 10 ms
+    assert by_delay[50, 0] == pytest.approx(-50.0 * hold_std(run))
+    assert by_loop[50, 0] == pytest.approx(0.0)  # it stands still
