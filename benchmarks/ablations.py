@@ -32,6 +32,7 @@ OFF: dict[str, dict[str, float]] = {
     "FARTHER": {"FARTHER": NO},
     "LEAST_SIDE": {"LEAST_SIDE": 0.0},
     "RUNS_OF_A_DRIFT": {"RUNS_OF_A_DRIFT": 1},
+    "CONFIDENCE": {"CONFIDENCE": 0.5},
     "AS_GOOD": {"AS_GOOD": 1.0},
     "MATTERS": {"MATTERS": NO},
     "IMAGINED": {"IMAGINED": 0.0},

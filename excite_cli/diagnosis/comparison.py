@@ -10,8 +10,8 @@ the log-likelihood that is gained where the noise of a block is what is left of 
 error. The same blocks are in both, so that what no model explains does not count, and the logarithm
 makes blocks alike in which there is more or less of the same. Next to nothing is left of a block in
 which a joint hardly moves, and that says nothing: ε_j is a twentieth of what both leave of an
-average block. S' is the better answer where D is 2 % of the error of every joint and block. A name
-is missed where D > t s, t of Student's distribution with B − 1 degrees of freedom.
+average block. S' is better where D > t s, t of Student's distribution with B − 1 degrees of freedom
+at the one confidence; a name is missed likewise, more surely.
 """
 
 from collections.abc import Collection, Sequence
@@ -47,8 +47,17 @@ class Difference:
 
     @property
     def better(self) -> bool:
-        """Whether the second leaves clearly less, by the mean logarithm of the RMS errors."""
-        return self.size / (2 * self.blocks * self.joints) > np.log(rules.AS_GOOD)
+        """Whether the second is better with the one confidence that is asked for."""
+        return self.surely(rules.CONFIDENCE)
+
+    def surely(self, confidence: float) -> bool:
+        """Whether the second is better with this confidence, one-sided."""
+        return self.size > float(student.ppf(confidence, self.blocks - 1)) * self.error
+
+    @property
+    def of_error(self) -> float:
+        """Logarithm of the ratio of RMS errors, mean over joints and blocks."""
+        return self.size / (2 * self.blocks * self.joints)
 
 
 class ModelComparison:
@@ -101,8 +110,7 @@ class ModelComparison:
             gains = [_difference(before[[j]], after[[j]]).size for j in rows]
             others = [j for j in rows if j != rows[int(np.argmax(gains))]]
             before, after = before[others], after[others]
-        found = _difference(before, after)
-        return found.size > float(student.ppf(rules.OF_A_NAME, found.blocks - 1)) * found.error
+        return _difference(before, after).surely(rules.OF_A_NAME)
 
     def _at(self, some: Sequence[int]) -> list[int]:
         """Where candidates are among the members."""

@@ -139,7 +139,8 @@ def sufficient(traced: SearchResult, models: ModelComparison) -> list[int]:
     if models.difference(found, every).better:
         found = every
     best, larger = sorted((plain, found), key=lambda some: _width(traced, some))
-    if models.difference(best, larger).better:
+    gained = models.difference(best, larger)
+    if gained.better and gained.of_error > np.log(rules.AS_GOOD):
         best = larger
     return those_that_matter(traced, best)
 

@@ -34,7 +34,7 @@ def textbook(candidates: Sequence[Candidate], models: ModelComparison) -> list[i
     for more in product((False, True), repeat=len(EVERYDAY)):
         kinds = [kind for kind, taken in zip(EVERYDAY, more, strict=True) if taken]
         chosen = _of(candidates, (*EVERYDAY_FRICTION, *kinds))
-        if best is None or models.difference(best, chosen).size > 0.0:
+        if best is None or models.difference(best, chosen).better:
             best = chosen
     assert best is not None
     return best

@@ -22,9 +22,11 @@ ABOVE_FLOOR = 20.0
 _HIGHEST_POSITION, _LOWEST_POSITION = 40.0, 8.0  # Hz
 HIGHEST_BY_RATE = 0.2  # of the recorded rate, for the cut-off of positions
 _SHARE_OF_SPEED = 0.99
-# What columns lose beyond the cut-off of positions must lie beyond what is averaged: friction at
-# reversals bends the motion of position-controlled joints. Coulomb friction of a simulated UR10 was
-# 2 to 4 % too large with 0.95 to 1.5 times the averages' cut-off, 1 % and less with twice.
+_POSITION_BY_BANDWIDTH = 5.0
+# Where a drive's law gives the torque, friction is read off the bends that it makes in the motion
+# at reversals, and what positions lose must lie beyond what is averaged. Coulomb friction of a
+# simulated UR10 was 2 to 4 % too large with 0.95 to 1.5 times the averages' cut-off, 1 to 1.5 %
+# with twice. With torque sensors that would only add noise: a joint's residual was missed by it.
 _POSITION_BY_PARALLEL = 2.0
 _PARALLEL_BY_BANDWIDTH, _HIGHEST_PARALLEL, _LOWEST_PARALLEL = 6.0, 12.0, 4.0
 # Standard deviation of a Gaussian average in time, times its -3 dB frequency.
@@ -81,7 +83,8 @@ def choose_processing(
     if spec.parallel != "auto":
         parallel, of_parallel = _given_cutoff("parallel", spec.parallel, highest), ""
     if spec.position == "auto":
-        least = _POSITION_BY_PARALLEL * usual
+        by_law = any(run.law is not None for run in runs)
+        least = _POSITION_BY_PARALLEL * usual if by_law else _POSITION_BY_BANDWIDTH * bandwidth
         position, of_position = _position_cutoff(frequency, power, fs, least, highest)
     else:
         position, of_position = _given_cutoff("position", spec.position, fs), ""

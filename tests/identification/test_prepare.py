@@ -203,8 +203,8 @@ def test_runs_too_short_or_too_slow_are_refused_in_words() -> None:
     """Cut-offs are chosen from the training runs; the held-out one may have another rate."""
     run = recorded()
     processing = choose_processing([run], FilterSpec())
-    with pytest.raises(FileError, match=r"run 'brief' is too short: 0\.498 s leave \d averaged"):
-        prepare(replace(run, name="brief").cut(0, 250), processing)
+    with pytest.raises(FileError, match=r"run 'brief' is too short: 0\.598 s leave \d averaged"):
+        prepare(replace(run, name="brief").cut(0, 300), processing)
     with pytest.raises(FileError, match="only 9 samples"):
         prepare(replace(run, name="brief").cut(0, 9), processing)
     fine = choose_processing([run], FilterSpec(position=30.0))
