@@ -13,7 +13,7 @@ two samples is told with it (`hold_std`).
 
 *Limits.* A drive that saturates at L gives clip(τ_j, ±L). L minimises what the textbook's model
 leaves of that torque, as a share of it, over quantiles of |τ_j|; it is taken if the share falls to
-half and the model asks for L, too, where it is reached.
+half.
 
 *Gains.* All of kp, φ and f times one factor fit as well, so the noise is taken to be one of e, and
 what the description says of its masses (`inertial_prior`, 30 %) tells the factor:
@@ -65,10 +65,7 @@ _ROUNDS = 2  # of delay and gains, or limits, in turn
 _SHARES = np.array([0.3, 0.5, 0.6, 0.7, 0.8, 0.87, 0.92, 0.96, 0.98, 1.0])
 _LEAST_LIMIT = 0.2
 _SATURATED = 0.5  # of the share that is left of a joint without a limit
-# Of a limit, RMS of what is left where it is reached: the model must ask for that torque there. A
-# payload that nobody declared had limits of 0.3 N·m on wrists, with 0.4 of it left.
-_AGREES = 0.15
-_FEWEST = 20  # usable samples of a joint at its limit
+_FEWEST = 20  # usable samples of a joint
 _DRIVEN = 0.2  # rad off its set point at which a drive gives its joint's largest torque, usually
 
 
@@ -297,26 +294,23 @@ class _Rows:
             if self._usable[:, j].sum() < _FEWEST or len(grid) < 2:
                 continue
 
-            def rest(limit: float, k: int = int(k), j: int = j) -> tuple[Array, float]:
+            def rest(limit: float, k: int = int(k), j: int = j) -> float:
+                """Share of the joint's torque that is left."""
                 limits = np.where(np.arange(len(law.limit)) == k, limit, law.limit)
                 tau = self.torque(replace(law, limit=limits))
-                left = fit(tau)[:, j]
-                return left, float(np.std(left) / np.std(tau[self._usable[:, j], j]))
+                return float(np.std(fit(tau)[:, j]) / np.std(tau[self._usable[:, j], j]))
 
-            errors = [rest(limit)[1] for limit in grid]
+            errors = [rest(limit) for limit in grid]
             best = int(np.argmin(errors))
             if errors[best] > _SATURATED * errors[-1]:
                 continue
             limit = minimize_scalar(
-                lambda x, rest=rest: rest(x)[1],
+                rest,
                 bounds=(grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]),
                 method="bounded",
                 options={"xatol": 1e-4 * grid[best]},
             ).x
-            there = self._usable[:, j] & (np.abs(free[:, j]) > limit)
-            off = float(np.sqrt(np.square(rest(limit)[0][there]).sum() / max(int(there.sum()), 1)))
-            if there.sum() >= _FEWEST and off < _AGREES * limit:
-                found[k] = float(limit)
+            found[k] = float(limit)
         return found
 
     def first_gains(self, law: DriveLaw) -> Array:
