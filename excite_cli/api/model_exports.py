@@ -11,12 +11,13 @@ from excite_cli.config.load_spec import files_of_config
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.pseudo_inertia import UNSURE, body_lengths, inertial_prior
 from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.effects.base import Effect
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.export import actuator_configs, mjcf, urdf
 from excite_cli.export.actuator_configs import joint_values
 from excite_cli.export.c_model import c_model
 from excite_cli.export.drive import Drive, drive_of
-from excite_cli.export.exported import OF_DRIVES, ModelText, with_straight_friction
+from excite_cli.export.exported import OF_DRIVES, ModelText, in_words, with_straight_friction
 from excite_cli.export.parameters import parameters_yaml
 from excite_cli.export.randomization import quantities, randomization
 from excite_cli.given_files import refuse_inputs_as_outputs
@@ -34,6 +35,7 @@ from excite_cli.shown.note import Level, Note, Tell
 from excite_cli.store.diagnosis_file import read_diagnosis
 from excite_cli.store.fit_file import read_fit
 from excite_cli.store.model_file import consistent_model, read_model
+from excite_cli.store.reduced_model import reduced_model
 from excite_cli.store.score_file import read_thresholds
 
 
@@ -113,7 +115,7 @@ def _actuators(stored: StoredModel, format: str, path: Path, tell: Tell) -> Mode
             "measurement.torque: command."
         )
     if format == "bam":
-        model, _ = with_straight_friction(stored, consistent_model(stored), actuator_configs.holds)
+        model = _simple(stored, "bam", path, tell)
         return actuator_configs.bam(robot, model, joint_values(robot, model, drive))
     values = joint_values(robot, _simple(stored, "mjcf", path, tell), drive)
     written = actuator_configs.isaaclab if format == "isaaclab" else actuator_configs.mjlab
@@ -157,8 +159,13 @@ def uncertain_model(stored: StoredModel) -> UncertainModel:
         model, estimate = fit.best_model, fit.model
         root = from_covariance(base, prior, fit.covariance)
     elif stored.what == "diagnosis":
-        model, estimate, factor = _of_diagnosis(stored, base.rank)
-        root = from_information(base, prior, factor)
+        reduced = reduced_model(read_diagnosis(stored.path), robot, mjcf.holds)
+        if reduced is None:
+            raise ConfigError(
+                f"{stored.path}: no robot like its model can exist. Diagnose again with more data."
+            )
+        model, estimate = reduced.model, reduced.estimate
+        root = from_information(base, prior, reduced.factor)
     else:
         raise FileError(
             f"{stored.path} holds no covariance. Give the fit (excite identify -o) or the "
@@ -176,28 +183,6 @@ def uncertain_model(stored: StoredModel) -> UncertainModel:
     )
 
 
-def _of_diagnosis(stored: StoredModel, rank: int) -> tuple[IdentifiedModel, IdentifiedModel, Array]:
-    """The consistent model, that of the data alone, and the factor of their information.
-
-    All in the order of the effects that this has.
-    """
-    found, model = read_diagnosis(stored.path), consistent_model(stored)
-    size = rank + len(model.values)
-    told = [(r.kind, r.joints, r.runs) for r in found.information.model]
-    names = stored.robot.joint_names
-    here = [(e.kind, tuple(names[j] for j in e.joints), e.runs) for e in model.effects]
-    if told != here:
-        raise FileError(
-            f"{stored.path}: its covariance is of other effects than its model. Diagnose again."
-        )
-    own = {(e.kind, e.joints, e.runs, e.covariate): x for e, x in stored.model.by_effect}
-    values = [own[e.kind, e.joints, e.runs, e.covariate] for e in model.effects]
-    estimate = IdentifiedModel(
-        stored.model.phi, model.effects, np.concatenate([np.zeros(0), *values])
-    )
-    return model, estimate, found.information.factor[:size, :size]
-
-
 def _carry(robot: Robot, model: IdentifiedModel) -> Array:
     """What one unit of each effect's parameter adds to φ (P, k)."""
     units = np.eye(len(model.values))
@@ -207,7 +192,7 @@ def _carry(robot: Robot, model: IdentifiedModel) -> Array:
 
 # Identified models as files: URDF, MJCF, YAML of all parameters.
 
-_HOLDS = {"urdf": urdf.holds, "mjcf": mjcf.holds}
+_HOLDS = {"urdf": urdf.holds, "mjcf": mjcf.holds, "bam": actuator_configs.holds}
 
 
 def write_models(
@@ -229,16 +214,34 @@ def write_models(
 
 
 def for_simulators(stored: StoredModel, kind: str) -> tuple[IdentifiedModel, tuple[str, ...]]:
-    """A model with bodies that can be, and with friction of a form that `kind` holds; a note."""
-    model = consistent_model(stored)
+    """A model with bodies that can be, and with effects that `kind` holds; notes of that."""
+    model, dropped = _held(stored, kind)
+    notes = []
+    if dropped:
+        words = in_words(dropped, stored.robot.joint_names)
+        notes.append(f"{kind.upper()} cannot hold: {words}. The rest was fitted again without them")
     model, joints = with_straight_friction(stored, model, _HOLDS[kind])
-    if not joints:
-        return model, ()
-    text = (
-        f"friction of {', '.join(joints)} is approximated by viscous and Coulomb friction, as "
-        f"{kind.upper()} has no other"
-    )
-    return model, (text,)
+    if joints:
+        notes.append(
+            f"friction of {', '.join(joints)} is approximated by viscous and Coulomb friction, as "
+            f"{kind.upper()} cannot hold its form"
+        )
+    return model, tuple(notes)
+
+
+def _held(stored: StoredModel, kind: str) -> tuple[IdentifiedModel, tuple[Effect, ...]]:
+    """The model without effects that neither `kind` nor MuJoCo holds, and these.
+
+    So rotors and springs, which a URDF cannot hold, are not taken for inertias.
+    """
+    if stored.what != "diagnosis":
+        return consistent_model(stored), ()
+
+    def holds(effect: Effect, values: Array) -> bool:
+        return _HOLDS[kind](effect, values) or mjcf.holds(effect, values)
+
+    reduced = reduced_model(read_diagnosis(stored.path), stored.robot, holds)
+    return (stored.model, ()) if reduced is None else (reduced.model, reduced.dropped)
 
 
 def write_model(

@@ -66,18 +66,19 @@ class PossibleSizes:
     def _too_much_taken(
         self, effect: Effect, own: slice, parameters: Array, chosen: Sequence[int]
     ) -> str:
-        """Why it takes more, beyond the error of the fit, than there is of what it varies."""
+        """Why it takes more, beyond the error of the fit, than a joint has of what it varies."""
         taken, slope = effect.taken(parameters[own])
-        slopes = np.zeros(len(parameters))
-        slopes[own] = -slope
-        slopes[self._at(effect.varied, effect.joints, len(parameters), chosen)] = 1.0
-        there = float(slopes @ parameters) + float(slope @ parameters[own])
-        if taken <= there:
-            return ""
-        variance = float(self._spread(chosen, slopes[:, None])[0, 0])
-        if there > 0.0 and taken - there <= _ERRORS * np.sqrt(max(variance, 0.0)):
-            return ""
-        return f"{effect.kind} of {taken:.3g} exceeds the {effect.varied} that it modulates"
+        for joint in effect.joints:
+            slopes = np.zeros(len(parameters))
+            slopes[own] = -slope
+            slopes[self._at(effect.varied, (joint,), len(parameters), chosen)] = 1.0
+            there = float(slopes @ parameters) + float(slope @ parameters[own])
+            if taken <= there:
+                continue
+            variance = float(self._spread(chosen, slopes[:, None])[0, 0])
+            if there <= 0.0 or taken - there > _ERRORS * np.sqrt(max(variance, 0.0)):
+                return f"{effect.kind} of {taken:.3g} exceeds the {effect.varied} there"
+        return ""
 
     def _at(
         self, kind: str, joints: tuple[int, ...], count: int, chosen: Sequence[int]

@@ -42,6 +42,7 @@ class CoupledFriction(Effect):
     defaults: ClassVar[Mapping[str, float]] = {"direction": 1.0}
     prior_cost: ClassVar = 3.0
     refines: ClassVar = ("viscous_friction", "coulomb_friction")
+    varies: ClassVar = ("viscous_friction",)
     usual: ClassVar = True
 
     @classmethod
@@ -53,6 +54,10 @@ class CoupledFriction(Effect):
         """A negative viscous part that outweighs the dry one belongs to the other direction."""
         viscous, coulomb = values
         return super().possible(values) and bool(viscous * _USUAL_SPEED >= -coulomb)
+
+    def taken(self, values: Array) -> tuple[float, Array]:
+        """|f_v|: the shaft's own share is part of the viscous friction of either joint."""
+        return float(abs(values[0])), np.array([np.sign(values[0]), 0.0])
 
     @property
     def completes(self) -> bool:

@@ -112,7 +112,8 @@ class Judgement:
     same_as: ClassVar[tuple[str, ...]] = ()  # kinds that together are the same columns
     # Kinds that are judged by the straight line through both: of themselves they may be nothing.
     deviates_from: ClassVar[tuple[str, ...]] = ()
-    # Kinds of the same joint that it may be the change of over the angle: never more than is there.
+    # Kinds of its joints that it is the change of over the angle, or a share of: never more than
+    # is there.
     varies: ClassVar[tuple[str, ...]] = ()
     # Dry or viscous friction of its one joint: part of the straight line that data sheets give.
     friction: ClassVar[bool] = False

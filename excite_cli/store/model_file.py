@@ -1,6 +1,6 @@
 """Reading models: a fit, a diagnosis, or a config that holds its numbers."""
 
-from dataclasses import fields, replace
+from dataclasses import fields
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -11,16 +11,12 @@ from excite_cli.config.load_spec import load_spec, parse_spec
 from excite_cli.config.spec import IdentifiedSpec, Spec
 from excite_cli.diagnosis.candidates import effect_of
 from excite_cli.diagnosis.records import EffectRecord
-from excite_cli.dynamics.base_parameters import find_base_parameters
-from excite_cli.dynamics.pseudo_inertia import body_lengths, inertial_prior
 from excite_cli.dynamics.regressor import standard_parameter_names, standard_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import kind_named, urdf_friction
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.given_files import require_stored
-from excite_cli.identification.consistent import consistent_near_prior
 from excite_cli.identification.errors_of_torque import Errors
-from excite_cli.identification.fit import effect_parameters
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.processing import Processing
 from excite_cli.identification.stored_model import StoredModel
@@ -28,6 +24,7 @@ from excite_cli.robot.model import Robot, build_measured_robot
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis
 from excite_cli.store.fit_file import is_fit, read_fit
 from excite_cli.store.own_file import is_own
+from excite_cli.store.reduced_model import reduced_model
 
 _TEXT = {".yaml", ".yml"}
 
@@ -86,36 +83,14 @@ def _of_diagnosis(path: Path) -> StoredModel:
 
 
 def consistent_model(stored: StoredModel) -> IdentifiedModel:
-    """The model with bodies that can be, for simulators; as it is where nothing tells better.
+    """The model with bodies that can be; as it is where nothing tells better.
 
     A fit has them; of a diagnosis they are those nearest to the URDF's that its data allow.
     """
     if stored.consistent is not None or stored.what != "diagnosis":
         return stored.consistent or stored.model
-    found, robot = read_diagnosis(stored.path), stored.robot
-    known = {
-        (r.kind, r.joints, r.runs, r.covariate): r.values
-        for r in (*found.declared, *(named.effect for named in found.effects))
-    }
-    told = found.information.model
-    at = [(r.kind, r.joints, r.runs, r.covariate) for r in told]
-    if not all(each in known for each in at):
-        return stored.model
-    model = _model(found.phi, [replace(r, values=known[k]) for r, k in zip(told, at, strict=True)],
-                   robot, stored.path)  # fmt: skip
-    base = find_base_parameters(robot)
-    size = base.rank + len(model.values)
-    factor = found.information.factor[:size, :size]
-    target = factor @ np.concatenate([base.mapping @ model.phi, model.values])
-    rows = np.zeros((size + 1, size + 1))
-    rows[:size, :size], rows[:size, size] = factor, target
-    cad = standard_parameters(robot)
-    signs = np.array([p.nonnegative for p in effect_parameters(model.effects)], bool)
-    prior = inertial_prior(robot, cad, 1.0)
-    nearest = consistent_near_prior(rows, base, prior, body_lengths(robot, cad), signs)
-    if not nearest.solved:
-        return stored.model
-    return IdentifiedModel(nearest.phi, model.effects, nearest.effects)
+    reduced = reduced_model(read_diagnosis(stored.path), stored.robot, lambda *_: True)
+    return stored.model if reduced is None else reduced.model
 
 
 def is_text(path: Path) -> bool:

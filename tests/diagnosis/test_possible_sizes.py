@@ -18,7 +18,7 @@ from excite_cli.robot.model import Array
 # A robot on which no size is absurd.
 LARGE = Seen(np.full(2, 1e12), np.zeros(2), 40.0)
 # Candidates of 1, 2, 10, 1 and 3 columns, and values with which each is possible.
-MIXED = ("viscous_friction", "coupled_friction", "payload", "encoder_offset", "cable_force")
+MIXED = ("viscous_friction", "asymmetric_friction", "payload", "encoder_offset", "cable_force")
 
 
 def candidate(kind: str, joints: tuple[int, ...] = (0,)) -> Candidate:
@@ -35,11 +35,33 @@ def possible(
 ) -> bool:
     """Whether the candidate may be so, beside three parameters of the declared model.
 
-    All parameters have this standard `error`.
+    All parameters have this standard `error`; of what it varies there is more than enough.
     """
-    spread = error**2 * np.eye(3 + len(values))
-    allowed = PossibleSizes([candidate(kind, joints)], lambda _, d: d.T @ spread @ d, seen)
-    return allowed(np.array([-1.0, -1e9, 7.0, *values]), [0], [0])
+    own = candidate(kind, joints)
+    varied = own.effect.varied
+    declared = [catalogue()[varied]((j,)) for j in joints] if varied else []
+    told = np.array([-1.0, -1e9, 7.0, *(1e9 for _ in declared), *values])
+    spread = error**2 * np.eye(len(told))
+    allowed = PossibleSizes([own], lambda _, d: d.T @ spread @ d, seen, declared)
+    return allowed(told, [0], [0])
+
+
+def test_a_coupled_shaft_has_no_more_viscous_friction_than_either_joint() -> None:
+    """Its own share is part of theirs: else the three together would drive the robot."""
+    own = candidate("coupled_friction", (0, 1))
+    viscous = [catalogue()["viscous_friction"]((j,)) for j in (0, 1)]
+    for error, most in ((1e-15, 2.0), (0.5, 2.0 + 2.0 * 0.5 * np.sqrt(2.0))):
+        spread = error**2 * np.eye(4)
+        sizes = PossibleSizes([own], lambda _, d, s=spread: d.T @ s @ d, LARGE, viscous)
+
+        def allowed(*values: float, sizes: PossibleSizes = sizes) -> bool:
+            return sizes(np.array(values), [0], [0])
+
+        for less, more in ((2.0, 5.0), (5.0, 2.0)):
+            assert allowed(less, more, 0.99 * most, 3.0)
+            assert allowed(less, more, -0.99 * most, 3.0)
+            assert not allowed(less, more, 1.01 * most, 3.0)
+        assert not allowed(-1.0, 5.0, 0.5, 3.0)  # nothing of a joint that has none
 
 
 def test_friction_that_depends_on_the_angle_takes_no_more_than_there_is() -> None:
