@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from excite_cli.api.arguments import checked, existing, paths_in
 from excite_cli.api.exported_chains import (
@@ -18,6 +19,7 @@ from excite_cli.api.outputs import held
 from excite_cli.claim import claim, leave
 from excite_cli.errors import ConfigError, FileError, nearest
 from excite_cli.export.exported import MODEL_FORMATS
+from excite_cli.export.held_out import HeldOutErrors
 from excite_cli.export.timed import timed_motion
 from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.motion_formats.base import MotionFormat
@@ -27,6 +29,7 @@ from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.diagnosis_file import is_diagnosis
 from excite_cli.store.fit_file import is_fit
 from excite_cli.store.model_file import is_text
+from excite_cli.summary.cells import percent
 from excite_cli.summary.pairs import not_modelled_in_words
 
 
@@ -52,7 +55,7 @@ class Exported:
     """The files that were written in `format`; of motions also what is in them.
 
     `rate` [Hz], and `slow`: the share of the limits that was requested. `not_modelled`: what the
-    verdict on the motions does not speak of.
+    verdict on the motions does not speak of. `held_out`: errors of a URDF or an MJCF.
     """
 
     format: str
@@ -61,6 +64,7 @@ class Exported:
     rate: float = 0.0
     slow: float | None = None
     not_modelled: tuple[str, ...] = ()
+    held_out: HeldOutErrors | None = None
 
 
 @checked()
@@ -135,8 +139,8 @@ def export_file(
         to = target or Path(f"{path.stem}{MODEL_FORMATS[format]}")
         wanted = ModelRequest(path, format, to, limits, samples, seed)
         with held({"output": to}, overwrite, (path, *paths_in(limits))):
-            write_requested(wanted, tell)
-        return Exported(format, (to,))
+            errors = write_requested(wanted, tell)
+        return Exported(format, (to,), held_out=errors)
     if samples is not None or seed is not None:
         raise ConfigError("--samples, --seed: only --format randomization draws samples.")
     exporter = MOTION_FORMATS.members[format]()
@@ -159,10 +163,12 @@ def export_file(
 
 
 def export_answer(found: Exported) -> Answer:
-    """What `excite export` answers: files, and what is in them."""
+    """What `excite export` answers: files, and what is in them.
+
+    Status 1 for a URDF or an MJCF that predicts held-out data no better than the URDF as given.
+    """
     if not found.motions:
-        path = str(found.paths[0])
-        return Answer((path,), {"format": found.format, "output": path})
+        return _model_answer(str(found.paths[0]), found)
     lines = tuple(
         f"{each.path}: {each.name}, {each.instants} samples, {each.duration:.5g} s"
         + (f", at {100 * each.pace:.4g}% of its planned speed" if found.slow is not None else "")
@@ -189,6 +195,27 @@ def export_answer(found: Exported) -> Answer:
     }
     said = (not_modelled_in_words(found.not_modelled),) if found.not_modelled else ()
     return Answer((*lines, *said), data)
+
+
+def _model_answer(path: str, found: Exported) -> Answer:
+    data: dict[str, Any] = {"format": found.format, "output": path}
+    errors = found.held_out
+    if errors is None:
+        return Answer((path,), data)
+    data["held_out"] = {
+        "run": errors.run, "file": errors.file, "model": errors.model, "urdf": errors.described
+    }  # fmt: skip
+    shares = [f"the whole model {percent(errors.model)}"]
+    if errors.described is not None:
+        shares.insert(0, f"the URDF as given {percent(errors.described)}")
+    text = (
+        f"On the held-out data ({errors.run}) it leaves {percent(errors.file)} of torque RMS, mean "
+        f"over joints ({', '.join(shares)})."
+    )
+    if not errors.worse:
+        return Answer((path, text), data)
+    bad = f"{path} predicts no better than the URDF as given: do not use it. {text}"
+    return Answer((bad, path), data, good=False)
 
 
 def _written(

@@ -18,11 +18,12 @@ from excite_cli.export.actuator_configs import joint_values
 from excite_cli.export.c_model import c_model
 from excite_cli.export.drive import Drive, drive_of
 from excite_cli.export.exported import OF_DRIVES, ModelText, in_words, with_straight_friction
+from excite_cli.export.held_out import HeldOutErrors, held_out_errors
 from excite_cli.export.parameters import parameters_yaml
 from excite_cli.export.randomization import quantities, randomization
 from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.identification.fit import Fit, effect_parameters
-from excite_cli.identification.identified_model import IdentifiedModel
+from excite_cli.identification.identified_model import IdentifiedModel, as_described
 from excite_cli.identification.stored_model import StoredModel
 from excite_cli.identification.uncertain_model import (
     UncertainModel,
@@ -66,11 +67,12 @@ MOST_SAMPLES = 100_000
 _SAMPLES, _SEED = 100, 1
 
 
-def write_requested(wanted: ModelRequest, tell: Tell) -> None:
+def write_requested(wanted: ModelRequest, tell: Tell) -> HeldOutErrors | None:
     """A fit, a diagnosis or a config with its numbers as a file of another program.
 
     URDF and MJCF hold physically consistent bodies, and straight friction where they have no form
-    for what was found; C is the model that the table of errors belongs to.
+    for what was found; C is the model that the table of errors belongs to. Of URDF and MJCF the
+    errors on held-out data, where the model has kept such.
     """
     stored = read_model(wanted.file)
     config = wanted.file if stored.what in ("config", "urdf") else None
@@ -88,6 +90,8 @@ def write_requested(wanted: ModelRequest, tell: Tell) -> None:
     elif format != "yaml":
         model = _simple(stored, format, path, tell)
         write_model(robot, model, format, path, tell, drive_of(stored.spec, robot.joint_names))
+        described = as_described(robot)
+        return held_out_errors(robot, stored.traces, model, _HOLDS[format], described)
     elif stored.what == "fit":
         write_models(robot, read_fit(wanted.file).fit, {"parameters": path}, tell)
     else:
@@ -95,6 +99,7 @@ def write_requested(wanted: ModelRequest, tell: Tell) -> None:
             f"{wanted.file} is not a fit; --format yaml takes fits only (write one "
             "with excite identify -o)."
         )
+    return None
 
 
 def _simple(stored: StoredModel, format: str, path: Path, tell: Tell) -> IdentifiedModel:

@@ -12,13 +12,11 @@ from excite_cli.api.model import Model, load_model
 from excite_cli.api.model_exports import for_simulators
 from excite_cli.api.scoring import recordings_of
 from excite_cli.checks.all_checks import look, without_fault
-from excite_cli.dynamics.regressor import standard_parameters
-from excite_cli.effects.catalogue import urdf_friction
 from excite_cli.errors import ConfigError, FileError, RobotError
 from excite_cli.export.drive import Drive, drive_of
 from excite_cli.export.exported import ModelText
 from excite_cli.export.mjcf import mjcf
-from excite_cli.identification.identified_model import IdentifiedModel
+from excite_cli.identification.identified_model import IdentifiedModel, as_described
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.stored_model import StoredModel
 from excite_cli.measurement.dataset import Dataset, Run
@@ -82,7 +80,7 @@ def replay(
             tell(Note(Level.WARNING, each.evidence))
     if drive_of(stored.spec, robot.joint_names) is not None:
         other = load_model(beside) if isinstance(beside, str | Path) else beside
-        return replay_set_points(given, other, pairs, _described(robot))
+        return replay_set_points(given, other, pairs, as_described(robot))
     if beside is not None:
         raise ConfigError(
             f"--beside: only where set points are played, and the torque of {stored.path} was "
@@ -131,22 +129,13 @@ def replay_answer(found: Replay | SetPointReplay) -> Answer:
 
 def _urdf(robot: Robot) -> ModelText | str | None:
     """The URDF as it is, why MuJoCo refuses it, or None where it has no masses."""
-    described = _described(robot)
+    described = as_described(robot)
     if described is None:
         return None
     try:
         return mjcf(robot, described)
     except RobotError as refused:
         return f"the URDF is not played: {refused}"
-
-
-def _described(robot: Robot) -> IdentifiedModel | None:
-    """The URDF as it is, with the friction of its <dynamics>; None where it has no masses."""
-    phi = standard_parameters(robot)
-    if not phi.any():
-        return None
-    effects, values = urdf_friction(robot)
-    return IdentifiedModel(phi, effects, values)
 
 
 def _played(run: PreparedRun, torque: Array) -> ReplayInput:

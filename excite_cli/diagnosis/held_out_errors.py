@@ -21,12 +21,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from excite_cli.diagnosis.search_result import SearchResult
-from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
-from excite_cli.effects.catalogue import urdf_friction
 from excite_cli.identification.averages import apply
 from excite_cli.identification.errors_of_torque import FEWEST, Errors
-from excite_cli.identification.identified_model import IdentifiedModel, Prediction, errors_on
+from excite_cli.identification.identified_model import (
+    IdentifiedModel,
+    Prediction,
+    as_described,
+    errors_on,
+)
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.regression import (
     effect_columns,
@@ -57,10 +60,8 @@ class HeldOutRuns:
     @property
     def by_urdf(self) -> Sequence[Prediction]:
         """What the URDF says as given, with the friction of its <dynamics>; none without masses."""
-        phi = standard_parameters(self.robot)
-        if not phi.any():
-            return ()
-        return self.predictions(IdentifiedModel(phi, *urdf_friction(self.robot)))
+        described = as_described(self.robot)
+        return () if described is None else self.predictions(described)
 
     def errors(self, predictions: Sequence[Prediction]) -> Errors:
         """Errors of predictions for all runs."""

@@ -11,8 +11,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import urdf_friction
 from excite_cli.identification.errors_of_torque import Errors, torque_errors
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.regression import (
@@ -113,3 +115,9 @@ def errors_on(
 ) -> Errors:
     """Errors of the predictions for `runs`."""
     return torque_errors(robot.joint_names, runs, [each.torque for each in predictions])
+
+
+def as_described(robot: Robot) -> IdentifiedModel | None:
+    """The robot as its URDF has it, with the friction of its <dynamics>; None without masses."""
+    phi = standard_parameters(robot)
+    return IdentifiedModel(phi, *urdf_friction(robot)) if phi.any() else None

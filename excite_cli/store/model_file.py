@@ -11,13 +11,13 @@ from excite_cli.config.load_spec import load_spec, parse_spec
 from excite_cli.config.spec import IdentifiedSpec, Spec
 from excite_cli.diagnosis.candidates import effect_of
 from excite_cli.diagnosis.records import EffectRecord
-from excite_cli.dynamics.regressor import standard_parameter_names, standard_parameters
+from excite_cli.dynamics.regressor import standard_parameter_names
 from excite_cli.effects.base import Effect
-from excite_cli.effects.catalogue import kind_named, urdf_friction
+from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.given_files import require_stored
 from excite_cli.identification.errors_of_torque import Errors
-from excite_cli.identification.identified_model import IdentifiedModel
+from excite_cli.identification.identified_model import IdentifiedModel, as_described
 from excite_cli.identification.processing import Processing
 from excite_cli.identification.stored_model import StoredModel
 from excite_cli.robot.model import Robot, build_measured_robot
@@ -112,11 +112,10 @@ def _of_config(path: Path) -> StoredModel:
             f"{path}: it declares effects and holds no values for them (`identified`). Give the "
             "fit or the diagnosis, or a config that `excite diagnose --apply` wrote."
         )
-    phi = standard_parameters(robot)
-    if not phi.any():
+    described = as_described(robot)
+    if described is None:
         raise ConfigError(f"{path}: the URDF has no masses, so it predicts no torque.")
-    effects, values = urdf_friction(robot)
-    return StoredModel(path, "urdf", spec, folder, robot, IdentifiedModel(phi, effects, values))
+    return StoredModel(path, "urdf", spec, folder, robot, described)
 
 
 def _of_numbers(
