@@ -69,6 +69,12 @@ def export(
     allow_unproved: bool = typer.Option(
         False, "--allow-unproved", help="Write motions that changed since they were proved, too."
     ),
+    lead: bool = typer.Option(
+        False,
+        "--lead",
+        help="Write set points that lead the motion by what drives of measurement.command lag "
+        "behind it.",
+    ),
     overwrite: options.Overwrite = False,
 ) -> None:
     """Write motions in the formats that controllers take, or a model for simulators and in C.
@@ -81,6 +87,10 @@ def export(
     A motion of a result that is not the one that was proved (its coefficients, verdict, config or
     robot changed since), or was written by an earlier version, is refused.
 
+    A robot whose drives follow set points lags behind those of the motion. With --lead, q of the
+    files are set points with which it plays the motion that was proved, as far as the URDF's
+    inertias are right: q + (torque + kd v) / kp, early by the delay of measurement.command.
+
     A model is a fit, a diagnosis or a config of `diagnose --apply`. As C it is one file without
     dependencies or allocation, with all effects that C can hold and a self-test. For domain
     randomization there are mean, covariance and samples of all numbers that simulators hold.
@@ -89,6 +99,7 @@ def export(
       excite export ur10.h5 --format csv --motion 1 -o motion.csv
       excite export ur10.h5 --format ros2 --entry --rate 500
       excite export ur10.h5 --format csv --motion 1 --slow 0.3 -o slow.csv
+      excite export go2.h5 --format csv --lead --rate 500
       excite export fit.h5 --format mjcf -o identified.xml
       excite export diagnosis.h5 --format c -o arm.c
       excite export fit.h5 --format randomization --samples 100 --seed 1
@@ -109,6 +120,7 @@ def export(
         samples=samples,
         seed=seed,
         allow_unproved=allow_unproved,
+        lead=lead,
         overwrite=overwrite,
         tell=terminal.tell,
     )
