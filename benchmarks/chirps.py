@@ -20,6 +20,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import cast
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -38,6 +39,7 @@ from excite_cli.excitation.random_baseline import random_baseline
 from excite_cli.identification.identify import Identification
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array
+from excite_cli.scoring.records import SetPointReplay
 from excite_cli.simulation.ground_truth import PlantedEffect
 from excite_cli.simulation.planned_motion import Planned, PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
@@ -63,7 +65,7 @@ KINDS = ("armature", "viscous_friction", "coulomb_friction")
 DELAY, ENCODER, INERTIAS_OFF, RATE = 0.008, 3e-4, 0.2, 500.0
 SECONDS, FIRST, LAST = 20.0, 0.1, 10.0  # s, Hz
 _MOST_TORQUE = 0.8  # of effort limits, as `excite init` has it
-_SHARES = np.geomspace(0.6, 0.01, 16)  # of half a joint's range
+_SHARES = np.geomspace(0.6, 0.003, 22)  # of half a joint's range
 _TRIED = 20
 _HELD_OUT = "other"
 
@@ -92,6 +94,9 @@ class Chirps:
         q = self.start + self.amplitudes * np.sin(phase)
         v = self.amplitudes * np.cos(phase) * speed
         return q, v, -self.amplitudes * np.sin(phase) * speed**2
+
+
+Moved = Planned | Chirps
 
 
 def chirps(problem: Problem) -> Chirps:
@@ -140,7 +145,7 @@ def _clear(problem: Problem, q: Array, v: Array) -> bool:
 
 
 def played(
-    problem: Problem, motions: Sequence[Planned | Chirps], seed: int = 1, nominal: bool = False
+    problem: Problem, motions: Sequence[Moved], seed: int = 1, nominal: bool = False
 ) -> Simulation:
     """What the robot makes of set points, without lead."""
     drive = configured_drive(problem)
@@ -152,13 +157,8 @@ def played(
     effects = declared_effects(problem.spec.effects, problem.robot)
     sizes = SIZES.get(problem.robot.name.removesuffix(".urdf"))
     planted = [PlantedEffect(e, np.array([sizes[e.kind]])) for e in effects] if sizes else []
-    return simulate(
-        problem.robot,
-        motions,
-        settings,
-        planted,
-        () if sizes else effects,  # type: ignore[arg-type]
-    )
+    made = cast(Sequence[Planned], motions)
+    return simulate(problem.robot, made, settings, planted, () if sizes else effects)
 
 
 def torque(problem: Problem, phi: Array, effects: Sequence[tuple[Effect, Array]], q: Array,
@@ -180,7 +180,7 @@ def motions_for(problem: Problem) -> tuple[list[Planned], PlannedMotion]:
     return made, PlannedMotion(_HELD_OUT, problem.trajectory, random.coefficients)
 
 
-def figures(problem: Problem, training: Sequence[Planned | Chirps], other: PlannedMotion,
+def figures(problem: Problem, training: Sequence[Moved], other: PlannedMotion,
             seed: int, folder: Path) -> str:  # fmt: skip
     """The row of one way to excite the robot."""
     made = played(problem, [*training, other], seed)
@@ -202,7 +202,7 @@ def figures(problem: Problem, training: Sequence[Planned | Chirps], other: Plann
     own = [(effect, found.fit.effect_values(k)) for k, effect in enumerate(found.fit.effects)]
     missed = torque(problem, found.fit.phi, own, *states) - true
     share = np.sqrt(np.mean(missed**2, axis=0) / np.mean(true**2, axis=0))
-    again = replay(folder / "fit.h5", data, held_out=True)
+    again = cast(SetPointReplay, replay(folder / "fit.h5", data, held_out=True))
     whole = [1e3 * np.mean(list(each.whole.values())) for each in again.models]
     return (
         "  ".join(words) + f"  {delay:6.2f}  {100 * share.mean():6.2f} {100 * share.max():6.2f}"
@@ -254,7 +254,9 @@ def main() -> None:
                 0.5 * np.subtract(*slow.robot.limits.ranges()[::-1])
             )
             print(f"{robot}: chirps of {share[0]:.3f} of half the ranges", flush=True)
-            ways = {"chirps": [swept], "planned": planned, "planned fast": quick}
+            ways: dict[str, Sequence[Moved]] = {
+                "chirps": [swept], "planned": planned, "planned fast": quick,
+            }  # fmt: skip
             for seed in arguments.seeds:
                 for name, motions in ways.items():
                     row = figures(slow, motions, other, seed, folder)

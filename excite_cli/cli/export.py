@@ -99,7 +99,6 @@ def export(
       excite export ur10.h5 --format csv --motion 1 -o motion.csv
       excite export ur10.h5 --format ros2 --entry --rate 500
       excite export ur10.h5 --format csv --motion 1 --slow 0.3 -o slow.csv
-      excite export go2.h5 --format csv --lead --rate 500
       excite export fit.h5 --format mjcf -o identified.xml
       excite export diagnosis.h5 --format c -o arm.c
       excite export fit.h5 --format randomization --samples 100 --seed 1
