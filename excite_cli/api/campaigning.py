@@ -17,7 +17,7 @@ from excite_cli.api.campaign_takes import Takes
 from excite_cli.api.diagnosing import diagnose, save_config
 from excite_cli.api.loading import Case
 from excite_cli.api.planning import PlanProgress, plan_after
-from excite_cli.api.simulating import simulate
+from excite_cli.api.simulating import PositionDrive, simulate
 from excite_cli.atomic import write_text_atomically
 from excite_cli.campaign.command import MeasureCommand as MeasureCommand
 from excite_cli.campaign.inbox import Inbox as Inbox
@@ -38,6 +38,7 @@ from excite_cli.config.load_spec import parse_spec, spec_as_yaml
 from excite_cli.config.spec import Spec
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.excitation.invariant import invariants
+from excite_cli.measurement.torque import given_law
 from excite_cli.report.page import render
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.simulation.settings import SimulationSettings
@@ -53,7 +54,11 @@ _OF_DATA = ("measurement", "identification", "diagnosis")
 
 @dataclass(frozen=True)
 class Simulated(Measure):
-    """A MuJoCo robot in place of a real one: with `effects` that the config need not know."""
+    """A MuJoCo robot in place of a real one: with `effects` that the config need not know.
+
+    Where the config says that set points are measured (`measurement.torque: command`), it has the
+    config's drives, with set points that lead the motion.
+    """
 
     case: Case
     effects: tuple[str, ...] = ()
@@ -61,10 +66,19 @@ class Simulated(Measure):
     suffix: str = ".h5"
 
     def take(self, take: Take) -> None:
-        """Play the motion and record it."""
-        simulate(
-            self.case, take.motion, self.effects, self.settings, output=take.data, overwrite=True
-        )
+        """Play the motion and record it.
+
+        Raises
+        ------
+        ConfigError
+            The config takes torques from set points, but gives no gains of the drives.
+        """
+        settings, measurement = self.settings, self.case.spec.measurement
+        if settings.drive is None and measurement.torque == "command":
+            law = given_law(measurement, self.case.robot.joint_names, "--measure simulate")
+            speeds = measurement.command.set_point_speeds
+            settings = replace(settings, drive=PositionDrive.of_law(law, speeds, lead=True))
+        simulate(self.case, take.motion, self.effects, settings, output=take.data, overwrite=True)
 
 
 @checked()

@@ -1,7 +1,7 @@
 """From a file to what is exported of it: motions repeated, entered from rest, slowed."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from excite_cli.api.motions import is_motion, motions_of
@@ -16,11 +16,13 @@ from excite_cli.excitation.inspection import not_in_config
 from excite_cli.excitation.motion import Doubt
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.result import Result
-from excite_cli.export.timed import repeated, require_own_samples
+from excite_cli.export.timed import instants, repeated, require_own_samples
+from excite_cli.measurement.torque import given_law
 from excite_cli.motion_formats.catalogue import read_own_motion
 from excite_cli.robot.model import Array, Robot, build_robot
 from excite_cli.shown.answer import Command, as_word
 from excite_cli.shown.note import Level, Note, Tell
+from excite_cli.simulation.leading import LeadingSetPoints
 from excite_cli.store.fit_file import fit_knowledge
 from excite_cli.store.result_file import read_result, read_samples
 from excite_cli.summary.pairs import doubts_in_words
@@ -76,7 +78,8 @@ def durations_of(chain: Chain) -> dict[str, float]:
 class ChainRequest:
     """Which motions of a result (none: all), how often, how slow, and from which posture.
 
-    `unproved`: also those that do not count as proved.
+    `unproved`: also those that do not count as proved. `lead`: seconds for which a set point
+    stands, where set points are written that lead the motions; None: the motions.
     """
 
     chosen: Sequence[int] = ()
@@ -84,6 +87,7 @@ class ChainRequest:
     slow: float | None = None
     start: Start | None = None
     unproved: bool = False
+    lead: float | None = None
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,8 @@ class ExportedChain:
     """What is written: `pace` is the share of its own pace at which the motion goes.
 
     `doubt`: why it does not count as proved, although its file says so. `not_modelled`: what its
-    verdict does not speak of; empty of a file that has no verdict.
+    verdict does not speak of; empty of a file that has no verdict. `written`: what stands in the
+    file, the chain or set points that lead it.
     """
 
     name: str
@@ -100,6 +105,12 @@ class ExportedChain:
     pace: float
     doubt: Doubt = Doubt.NONE
     not_modelled: tuple[str, ...] = ()
+    leading: LeadingSetPoints | None = None
+
+    @property
+    def written(self) -> Chain | LeadingSetPoints:
+        """What has the states that are written."""
+        return self.leading or self.chain
 
 
 def chains_of(file: Path, wanted: ChainRequest, tell: Tell) -> list[ExportedChain]:
@@ -129,10 +140,28 @@ def chains_of(file: Path, wanted: ChainRequest, tell: Tell) -> list[ExportedChai
         slowed = [slowed_chain(limits, chain, wanted.slow) for chain in chains]
         chains, paces = [chain for chain, _ in slowed], [pace for _, pace in slowed]
     missing = _not_modelled(file, result)
-    return [
+    found = [
         ExportedChain(segment.name, joints, chain, pace, doubt, missing)
         for segment, chain, pace, doubt in zip(motions, chains, paces, doubts, strict=True)
     ]
+    return found if wanted.lead is None else _leading(file, result, found, wanted.lead, tell)
+
+
+def _leading(
+    file: Path, result: Result, chains: Sequence[ExportedChain], step: float, tell: Tell
+) -> list[ExportedChain]:
+    """With set points that lead the motions, for the drives of the result's config."""
+    spec, found = parse_spec(result.config, f"the config stored in {file}"), []
+    robot = build_robot(spec.robot, Path(result.config_folder))
+    law = given_law(spec.measurement, robot.joint_names, f"--lead: the config stored in {file}")
+    speeds = spec.measurement.command.set_point_speeds
+    for each in chains:
+        leading = LeadingSetPoints(each.chain, robot, law, step, speeds)
+        times = instants(leading.duration, 1.0 / step)
+        if note := leading.clipped(times, each.name):
+            tell(note)
+        found.append(replace(each, leading=leading))
+    return found
 
 
 def _not_modelled(file: Path, result: Result) -> tuple[str, ...]:
@@ -144,6 +173,11 @@ def _not_modelled(file: Path, result: Result) -> tuple[str, ...]:
 
 def _own_motion(file: Path, wanted: ChainRequest) -> tuple[tuple[str, ...], Segment]:
     """Joint names and the motion of a file in a controller's format."""
+    if wanted.lead is not None:
+        raise FileError(
+            f"--lead: {file} does not say which robot and drives it was made for. A result file "
+            "does; give one."
+        )
     others = [number for number in wanted.chosen if number != 1]
     if others:
         raise FileError(f"--motion {others[0]}: {file} holds one motion.")

@@ -83,6 +83,7 @@ def export_file(
     samples: int | None = None,
     seed: int | None = None,
     allow_unproved: bool = False,
+    lead: bool = False,
     overwrite: bool = False,
     tell: Tell = log_note,
 ) -> Exported:
@@ -101,7 +102,8 @@ def export_file(
     m], the others at robot.posture) entered from rest there and left for it again.
 
     Motions of a result that changed since they were proved, or of an earlier version, are written
-    only with `allow_unproved`.
+    only with `allow_unproved`. With `lead`, set points are written in place of the motions, for
+    drives of `measurement.command`: they lead the motion by what these lag behind it.
 
     `thresholds` (JSON of `excite score --thresholds`) make a model in C a collision detector, too.
     `samples` (100) robots are drawn with `seed` (1) for `randomization`.
@@ -134,6 +136,8 @@ def export_file(
         )
     if thresholds is not None and format != "c":
         raise ConfigError(f"--thresholds: only a model in C holds them, not {format}.")
+    if lead and format in MODEL_FORMATS:
+        raise ConfigError("--lead: it is about set points of motions, and this is a model.")
     if format in MODEL_FORMATS:
         limits = None if thresholds is None else existing(thresholds)
         to = target or Path(f"{path.stem}{MODEL_FORMATS[format]}")
@@ -144,7 +148,8 @@ def export_file(
     if samples is not None or seed is not None:
         raise ConfigError("--samples, --seed: only --format randomization draws samples.")
     exporter = MOTION_FORMATS.members[format]()
-    chains = chains_of(path, ChainRequest(chosen, periods, slow, start, allow_unproved), tell)
+    step = 1.0 / rate if lead else None
+    chains = chains_of(path, ChainRequest(chosen, periods, slow, start, allow_unproved, step), tell)
     paths = _paths(path, target, exporter, [each.name for each in chains])
     refuse_inputs_as_outputs({f"--output ({to})": to for to in paths}, (path,))
     with _held(paths, exporter, overwrite):
@@ -222,7 +227,7 @@ def _written(
     each: ExportedChain, path: Path, exporter: MotionFormat, rate: float, equidistant: bool
 ) -> ExportedMotion:
     timed = timed_motion(
-        each.name, each.joint_names, each.chain, rate, equidistant, exporter.whole_nanoseconds
+        each.name, each.joint_names, each.written, rate, equidistant, exporter.whole_nanoseconds
     )
     exporter.write(path, timed)
     return ExportedMotion(

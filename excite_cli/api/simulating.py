@@ -5,6 +5,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
+import numpy as np
+
 from excite_cli.api.arguments import checked
 from excite_cli.api.exported_chains import Start, entered, start_posture
 from excite_cli.api.loading import Case, inputs_of, measured_case, problem_of
@@ -17,10 +19,13 @@ from excite_cli.errors import FileError
 from excite_cli.excitation.problem import Problem
 from excite_cli.export.timed import repeated
 from excite_cli.measurement.hdf5_writer import write_dataset
+from excite_cli.measurement.torque import given_law
+from excite_cli.robot.model import Robot
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.simulation.base_sensors import Instruments
 from excite_cli.simulation.covariate_series import parse_series as parse_series
 from excite_cli.simulation.ground_truth import parse_planted
+from excite_cli.simulation.leading import LeadingSetPoints
 from excite_cli.simulation.mujoco_model import load_mujoco
 from excite_cli.simulation.planned_motion import Planned, PlannedMotion, PlannedProgram
 from excite_cli.simulation.position_drive import PositionDrive as PositionDrive
@@ -98,9 +103,25 @@ def simulate(
             lambda run, done: progress(run, done, sum(map(len, takes.values()))),
         )
         _hint_at_lag(found, tell)
+        _hint_at_limits(robot, planned, settings, tell)
         if output is not None:
             write_dataset(Path(output), found.dataset, _attributes(problem, found, settings))
         return found
+
+
+def configured_drive(case: Problem | Case) -> PositionDrive | None:
+    """The drive that follows set points as the config describes it; None where it has none.
+
+    Raises
+    ------
+    ConfigError
+        `measurement.command` names joints that the robot does not move, or what no drive has.
+    """
+    measurement = case.spec.measurement
+    if measurement.torque != "command" or measurement.command.kp is None:
+        return None
+    law = given_law(measurement, case.robot.joint_names, "measurement.command")
+    return PositionDrive.of_law(law, measurement.command.set_point_speeds)
 
 
 def _planned(
@@ -168,6 +189,19 @@ def _hint_at_lag(found: Simulation, tell: Tell) -> None:
             "a slower motion."
         )
         tell(Note(Level.HINT, text, run))
+
+
+def _hint_at_limits(
+    robot: Robot, motions: Sequence[Planned], settings: SimulationSettings, tell: Tell
+) -> None:
+    """Set points that lead a motion stop at the joints' limits."""
+    drive = settings.drive
+    for motion in motions:
+        sent = motion if drive is None else drive.sent_for(motion, robot)
+        if isinstance(sent, LeadingSetPoints):
+            note = sent.clipped(np.arange(0.0, motion.duration, sent.step), motion.name)
+            if note is not None:
+                tell(note)
 
 
 def _attributes(

@@ -69,6 +69,12 @@ def export(
     allow_unproved: bool = typer.Option(
         False, "--allow-unproved", help="Write motions that changed since they were proved, too."
     ),
+    lead: bool = typer.Option(
+        False,
+        "--lead",
+        help="Write set points that lead the motion by what drives of measurement.command lag "
+        "behind it.",
+    ),
     overwrite: options.Overwrite = False,
 ) -> None:
     """Write motions in the formats that controllers take, or a model for simulators and in C.
@@ -80,6 +86,10 @@ def export(
 
     A motion of a result that is not the one that was proved (its coefficients, verdict, config or
     robot changed since), or was written by an earlier version, is refused.
+
+    A robot whose drives follow set points lags behind those of the motion. With --lead, q of the
+    files are set points with which it plays the motion that was proved, as far as the URDF's
+    inertias are right: q + (torque + kd v) / kp, early by the delay of measurement.command.
 
     A model is a fit, a diagnosis or a config of `diagnose --apply`. As C it is one file without
     dependencies or allocation, with all effects that C can hold and a self-test. For domain
@@ -109,6 +119,7 @@ def export(
         samples=samples,
         seed=seed,
         allow_unproved=allow_unproved,
+        lead=lead,
         overwrite=overwrite,
         tell=terminal.tell,
     )

@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -106,17 +107,19 @@ def simulate(
     torque_limits: bool = _of_robot(
         False, "--torque-limits", help="Motors saturate at the robot's effort limits."
     ),
-    control: Control = _driven(
-        Control.TRACKING,
+    control: Control | None = _driven(
+        None,
         "--control",
         help="tracking: a controller with a model; position: drives that follow set points, whose "
-        "log holds positions and set points, but no torque.",
+        "log holds positions and set points, but no torque. Default: position where the config "
+        "gives measurement.command.kp.",
     ),
     kp: list[str] | None = _driven(
         None,
         "--kp",
         metavar="NUMBER|JOINT=NUMBER",
-        help="With --control position: stiffness of the drives [N·m/rad, N/m] (may be repeated).",
+        help="With --control position: stiffness of the drives [N·m/rad, N/m] (may be repeated). "
+        "Default: the config's, and so for --kd and --command-delay.",
     ),
     kd: list[str] | None = _driven(
         None,
@@ -132,12 +135,18 @@ def simulate(
     command_delay: float | None = _driven(
         None,
         "--command-delay",
-        help="With --control position: seconds from sending a set point until it acts. Default: 0.",
+        help="With --control position: seconds from sending a set point until it acts.",
     ),
     set_point_speeds: bool = _driven(
         False,
         "--set-point-speeds",
         help="With --control position: send planned speeds too (v_cmd); without, they are 0.",
+    ),
+    lead: bool = _driven(
+        False,
+        "--lead",
+        help="With --control position: set points lead the motion by what the drives lag behind "
+        "it, by the URDF's inertias.",
     ),
     seed: options.Seed = None,
     overrides: options.Set = None,
@@ -152,7 +161,8 @@ def simulate(
 
     With --control position the drives follow set points, τ = kp (q* - q) + kd (v* - v), and the
     log holds t, q, q_cmd (v_cmd) and no torque, as of quadrupeds and servos; gains and delay are
-    in `truth`. Motions are planned as ever: what the drives cannot follow, the robot does not do.
+    in `truth`. What the drives cannot follow, the robot does not do: constraints.tracking_error
+    plans for that, and with --lead the robot plays the motion as it was planned.
 
     Examples:
       excite simulate ur10.yaml ur10.h5 -o measured.h5 \\
@@ -169,7 +179,12 @@ def simulate(
           --command-delay 0.01
     """
     from excite_cli.api.loading import load_case
-    from excite_cli.api.simulating import SimulationSettings, parse_series, simulation_answer
+    from excite_cli.api.simulating import (
+        SimulationSettings,
+        configured_drive,
+        parse_series,
+        simulation_answer,
+    )
     from excite_cli.api.simulating import simulate as simulate_motions
 
     start = start_from(posture, entry)
@@ -188,12 +203,14 @@ def simulate(
         covariates=parse_series(covariate or ()),
         drive=_drive(
             control,
+            configured_drive(case),
             case.robot.joint_names,
             kp,
             kd,
             command_rate,
             command_delay,
             set_point_speeds,
+            lead,
         ),
         **_base_noise(case.spec, wrench_noise, imu_noise),
     )
@@ -215,15 +232,17 @@ def simulate(
 
 
 def _drive(
-    control: Control,
+    control: Control | None,
+    known: "PositionDrive | None",
     joint_names: Sequence[str],
     kp: list[str] | None,
     kd: list[str] | None,
     command_rate: float | None,
     command_delay: float | None,
     set_point_speeds: bool,
+    lead: bool,
 ) -> "PositionDrive | None":
-    """The drive that the options describe; None for the tracking controller.
+    """The drive that the options describe, else that `known` from the config; None: tracking.
 
     Raises
     ------
@@ -234,28 +253,32 @@ def _drive(
 
     options = {
         "--kp": kp, "--kd": kd, "--command-rate": command_rate, "--command-delay": command_delay,
-        "--set-point-speeds": set_point_speeds or None,
+        "--set-point-speeds": set_point_speeds or None, "--lead": lead or None,
     }  # fmt: skip
-    if control is Control.TRACKING:
+    if control is Control.TRACKING or (control is None and known is None):
         given = [name for name, value in options.items() if value is not None]
         if given:
             raise ConfigError(
                 f"{given[0]}: only drives that follow set points have it. Add --control position."
             )
         return None
-    missing = [name for name in ("--kp", "--kd") if not options[name]]
+    missing = [name for name in ("--kp", "--kd") if known is None and not options[name]]
     if missing:
         raise ConfigError(
             f"--control position: {' and '.join(missing)} missing. Give the gains of the drives, "
-            "for all joints (--kp 20 --kd 0.5) or one by one (--kp elbow=40); 0 is a --kd as well."
+            "for all joints (--kp 20 --kd 0.5) or one by one (--kp elbow=40), or in the config "
+            "(measurement.command); 0 is a --kd as well."
         )
-    return PositionDrive(
-        parse_gains("--kp", kp or (), joint_names),
-        parse_gains("--kd", kd or (), joint_names),
-        500.0 if command_rate is None else command_rate,
-        0.0 if command_delay is None else command_delay,
-        set_point_speeds,
-    )
+    values = {
+        "kp": parse_gains("--kp", kp, joint_names) if kp else None,
+        "kd": parse_gains("--kd", kd, joint_names) if kd else None,
+        "command_rate": command_rate,
+        "delay": command_delay,
+        "set_point_speeds": set_point_speeds or None,
+        "lead": lead or None,
+    }
+    chosen: dict[str, Any] = {key: value for key, value in values.items() if value is not None}
+    return PositionDrive(**chosen) if known is None else replace(known, **chosen)
 
 
 def _base_noise(spec: "Spec", wrench: str | None, imu: str | None) -> dict[str, float]:

@@ -178,6 +178,11 @@ class ConstraintsSpec(Section):
 
     joint_limits: JointLimitsSpec | None = JointLimitsSpec()
     torque: TorqueSpec | None = None
+    tracking_error: Positive | dict[str, Positive] | None = Field(
+        None,
+        description="[rad or m] how far set points may be from positions, or {joint: number}: what "
+        "drives with `measurement.torque: command` need for the torque (and kd times the speed)",
+    )
     balance: BalanceSpec | None = None
     contact: ContactSpec | None = None
     self_collision: SelfCollisionSpec | None = None

@@ -3,7 +3,7 @@
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, StrictBool, field_validator, model_validator
 
 from excite_cli.config.section import (
     Finite,
@@ -136,7 +136,14 @@ class DriveLawSpec(Section):
         "give or take as much",
     )
     limit: PerJoint | None = Field(
-        None, description="[N·m] at which the drive's torque stops; default: found in the data"
+        None,
+        description="[N·m] at which the drive's torque stops; motions keep it as they keep effort "
+        "limits; default: found in the data",
+    )
+    set_point_speeds: StrictBool = Field(
+        False,
+        description="set points have speeds too (v*), for motions that are planned or simulated; a "
+        "log shows it by its columns v_cmd",
     )
 
 

@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 
 from excite_cli.config.constraints_spec import ConstraintsSpec
+from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.setting import Setting
 from excite_cli.constraints.standing import Standing
@@ -28,6 +29,7 @@ CONSTRAINTS: Registry[Constraint] = Registry(
     {
         "joint_limits": "joint_bound:JointBound",
         "torque": "joint_torque:JointTorque",
+        "tracking_error": "tracking_error:TrackingError",
         "balance": "balance:Balance",
         "contact": "ground_contact:GroundContact",
         "self_collision": "self_collision:SelfCollision",
@@ -49,12 +51,15 @@ def settings_of(constraint: type[Constraint]) -> list[inspect.Parameter]:
 
 
 def build_constraints(
-    spec: ConstraintsSpec, robot: Robot, uncertainty: InertiaUncertainty | None = None
+    spec: ConstraintsSpec,
+    robot: Robot,
+    uncertainty: InertiaUncertainty | None = None,
+    measurement: MeasurementSpec = MeasurementSpec(),
 ) -> tuple[Constraint, ...]:
     """All constraints that `spec` asks for, joint bounds first.
 
     Torque, balance and contact hold for every inertia that `uncertainty` admits; without it, for
-    those of the URDF.
+    those of the URDF. Limits of drives that follow set points are those of `measurement`.
 
     Raises
     ------
@@ -62,7 +67,7 @@ def build_constraints(
         A limit is requested that the robot does not have and the file does not give, or one of
         `own` is not in the catalogue, or has settings that do not fit.
     """
-    setting = Setting(spec, robot, uncertainty)
+    setting = Setting(spec, robot, uncertainty, measurement)
     found: list[Constraint] = []
     for key, member in CONSTRAINTS.members.items():
         given = getattr(spec, key) if key in _SECTIONS else None

@@ -23,11 +23,15 @@ from excite_cli.dynamics.row_adjoint import RowAdjoint
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
 from excite_cli.dynamics.whole_robot import drawn_states
 from excite_cli.errors import ConfigError
+from excite_cli.measurement.torque import check_joints
+from excite_cli.measurement.torque_sources.base import per_joint
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.enclosed_rows import least_of, torque_rows
 from excite_cli.proof.taylor import Taylor
 from excite_cli.robot.effort_curve import EffortCurve
 from excite_cli.robot.model import Robot
+
+_BY_DRIVE = " (measurement.command.limit)"
 
 
 class JointTorque(Constraint):
@@ -35,7 +39,8 @@ class JointTorque(Constraint):
 
     `curves` (n,): torque by speed; infinite: not bounded.
 
-    `uncertainty`: admitted inertias of the whole robot; None: those of the URDF.
+    `uncertainty`: admitted inertias of the whole robot; None: those of the URDF. `reasons` (n,)
+    stand behind the labels of a joint: what its bound comes from, where that is no effort limit.
     """
 
     name = "joint_torque"
@@ -48,6 +53,7 @@ class JointTorque(Constraint):
         robot: Robot,
         curves: Sequence[EffortCurve],
         uncertainty: InertiaUncertainty | None = None,
+        reasons: Sequence[str] | None = None,
     ) -> None:
         self._dynamics = InverseDynamics(robot)
         bounded = np.flatnonzero([np.isfinite(curve.efforts[0]) for curve in curves])
@@ -58,8 +64,9 @@ class JointTorque(Constraint):
         )
         self.scale = self._available.still
         self._sliding = robot.sliding
+        why = np.array(reasons or [""] * robot.n)
         self.labels = tuple(
-            f"{robot.joint_names[j]} {side}" for side in ("lower", "upper") for j in bounded
+            f"{robot.joint_names[j]} {side}{why[j]}" for side in ("lower", "upper") for j in bounded
         )
         self.uncertainty = uncertainty
         self._admitted = (uncertainty or InertiaUncertainty.none(robot)).of_moving_bodies()
@@ -80,14 +87,18 @@ class JointTorque(Constraint):
         found: list[Constraint] = []
         if np.isfinite(of_motors).any():
             found.append(MotorTorque(robot, of_motors, setting.uncertainty))
-        if not found and not np.isfinite(robot.limits.effort).any():
+        limits = robot.limits.curves
+        capped = [c.capped(most) for c, most in zip(limits, _of_drives(setting), strict=True)]
+        reasons = ["" if c is own else _BY_DRIVE for c, own in zip(capped, limits, strict=True)]
+        curves = [curve.scaled(spec.scale) for curve in capped]
+        bounded = np.isfinite([curve.efforts[0] for curve in curves]).any()
+        if not found and not bounded:
             raise ConfigError(
                 "constraints.torque: the URDF gives no effort limits; give "
                 "robot.limits.<joint>.effort."
             )
-        if np.isfinite(robot.limits.effort).any():
-            curves = [curve.scaled(spec.scale) for curve in robot.limits.curves]
-            found.insert(0, cls(robot, curves, setting.uncertainty))
+        if bounded:
+            found.insert(0, cls(robot, curves, setting.uncertainty, reasons))
         return found
 
     @property
@@ -167,6 +178,15 @@ class JointTorque(Constraint):
         rows = self._regressor.evaluate(q[instants], v[instants], a[instants])[inverse, joints]
         phi = sign * self._admitted.worst(sign * rows)
         return self._adjoint.torques(q, v, a, times, joints, phi)
+
+
+def _of_drives(setting: Setting) -> Array:
+    """Torques (n,) at which drives that follow set points stop, infinite where none is given."""
+    measurement, names = setting.measurement, setting.robot.joint_names
+    if measurement.torque != "command" or measurement.command.limit is None:
+        return np.full(len(names), np.inf)
+    check_joints(measurement, names)
+    return per_joint(measurement.command.limit, names, np.inf)
 
 
 # The torque that bounded joints may give on either side, at the speed that they have.

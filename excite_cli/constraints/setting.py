@@ -1,9 +1,10 @@
 """What every constraint of a problem is built for."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from excite_cli.config.constraints_spec import ConstraintsSpec, SelfCollisionSpec
+from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
 from excite_cli.dynamics.whole_robot import CenterOfMass
@@ -15,11 +16,12 @@ from excite_cli.robot.model import Array, Robot
 
 @dataclass(frozen=True)
 class Setting:
-    """The robot, what the config says, and what is known of the inertias."""
+    """The robot, what the config says, and what is known of inertias and drives."""
 
     spec: ConstraintsSpec
     robot: Robot
     uncertainty: InertiaUncertainty | None = None
+    measurement: MeasurementSpec = field(default_factory=MeasurementSpec)
 
     @property
     def bounded(self) -> bool:

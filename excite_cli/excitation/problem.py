@@ -269,7 +269,9 @@ def build_problem(
         boundary=build_boundary(spec.trajectory, robot, trajectory),
         criterion=criterion,
         weighting=weighting,
-        constraints=build_constraints(spec.constraints, robot, _uncertainty(spec, robot, own, fit)),
+        constraints=build_constraints(
+            spec.constraints, robot, _uncertainty(spec, robot, own, fit), spec.measurement
+        ),
         cost_basis=trajectory.basis(cost),
         constraint_basis=trajectory.basis(grid),
         kinematics=BatchKinematics(robot),

@@ -10,6 +10,7 @@ from excite_cli.errors import ConfigError, FileError
 from excite_cli.excitation.result import Result
 from excite_cli.motion_formats.timed_motion import TimedMotion
 from excite_cli.robot.model import Array
+from excite_cli.simulation.leading import Moves
 from excite_cli.trajectory.fade import Chain, Segment
 
 MAX_INSTANTS, MAX_PERIODS = 2_000_000, 10_000
@@ -20,12 +21,12 @@ _CLOSED = 1e-6
 def timed_motion(
     name: str,
     joint_names: tuple[str, ...],
-    chain: Chain,
+    chain: Moves,
     rate: float,
     equidistant: bool = False,
     whole_nanoseconds: bool = False,
 ) -> TimedMotion:
-    """The chain at `instants`, q, v, a exact there.
+    """The chain (or set points that lead it) at `instants`, q, v, a exact there.
 
     Raises
     ------

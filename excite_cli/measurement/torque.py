@@ -21,6 +21,7 @@ from excite_cli.measurement.dataset import Array, Dataset, Finding, Mask, Run
 from excite_cli.measurement.motors import Motors, at_motors
 from excite_cli.measurement.torque_sources.base import per_joint
 from excite_cli.measurement.torque_sources.catalogue import torque_source
+from excite_cli.measurement.torque_sources.command import Command, DriveLaw, law_of
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 RADIANS = {"rad": 1.0, "deg": np.pi / 180}
@@ -102,6 +103,23 @@ def check_joints(spec: MeasurementSpec, joints: tuple[str, ...], torques: bool =
         raise ConfigError("measurement.gear_ratio: a ratio of 0 means nothing.")
     if abs(np.linalg.det(np.eye(len(joints)) + _shares(spec, joints))) < 1e-9:
         raise ConfigError("measurement.coupling: these shares cannot be inverted.")
+
+
+def given_law(spec: MeasurementSpec, joints: tuple[str, ...], asks: str) -> DriveLaw:
+    """The law of drives that follow set points, whose gains the config gives.
+
+    Raises
+    ------
+    ConfigError
+        It does not, or names other joints; `asks` is what needs the law.
+    """
+    if spec.torque != Command.name or spec.command.kp is None:
+        raise ConfigError(
+            f"{asks}: it takes the gains of drives that follow set points. Give measurement.torque:"
+            " command and measurement.command.kp, or leave it out."
+        )
+    check_joints(spec, joints)
+    return law_of(spec, joints)
 
 
 def to_joints(

@@ -31,6 +31,13 @@ class EffortCurve:
         """The same at every speed."""
         return cls(np.zeros(1), np.array([effort]))
 
+    @classmethod
+    def falling(cls, effort: float, slope: float) -> "EffortCurve":
+        """`effort` at no speed, and `slope` less of it for every unit of speed."""
+        if slope == 0.0 or not np.isfinite(effort):
+            return cls.constant(effort)
+        return cls(np.array([0.0, 1.0]), np.array([effort, effort - slope]))
+
     @property
     def slopes(self) -> Array:
         """Slope (P,) of the line before each point: 0 before the first, where it brakes."""
@@ -49,6 +56,20 @@ class EffortCurve:
         """c(s) at each of `speed`."""
         at = self.line(speed)
         return np.asarray(self.efforts[at] + self.slopes[at] * (speed - self.speeds[at]))
+
+    def capped(self, most: float) -> "EffortCurve":
+        """No more than `most` (above 0) at any speed."""
+        if most >= self.efforts[0]:
+            return self
+        first = int(np.sum(self.efforts >= most))  # of the points that stay
+        slope = self.slopes[min(first, len(self.speeds) - 1)]
+        if slope == 0.0:
+            return EffortCurve.constant(most)
+        meets = self.speeds[first - 1] + (most - self.efforts[first - 1]) / slope
+        speeds, efforts = self.speeds[first:], self.efforts[first:]
+        if not len(speeds):  # the last line goes on
+            speeds, efforts = np.array([meets + 1.0]), np.array([most + slope])
+        return EffortCurve(np.r_[0.0, meets, speeds], np.r_[most, most, efforts])
 
     def scaled(self, share: float) -> "EffortCurve":
         """That share of the torque at every speed."""

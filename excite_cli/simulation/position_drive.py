@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 
 from excite_cli.errors import ConfigError, nearest
-from excite_cli.robot.model import Array
+from excite_cli.measurement.torque_sources.command import DriveLaw
+from excite_cli.robot.model import Array, Robot
+from excite_cli.simulation.leading import LeadingSetPoints, Moves
 from excite_cli.simulation.planned_motion import Planned
 
 LONGEST_DELAY = 1.0  # s
@@ -28,7 +30,8 @@ class PositionDrive:
     """Gains `kp` (n,) [N·m/rad] and `kd` (n,) [N·m·s/rad] (N/m, N·s/m), and the command's way.
 
     `command_rate` [Hz] of the set points, `delay` [s] until one acts; with `set_point_speeds` they
-    have speeds, too.
+    have speeds, too. `limit` (n,) [N·m] (N) of the torque, empty: none. With `lead`, set points
+    lead the motion by what drives lag behind (`leading.py`).
     """
 
     kp: tuple[float, ...]
@@ -36,6 +39,30 @@ class PositionDrive:
     command_rate: float = 500.0
     delay: float = 0.0
     set_point_speeds: bool = False
+    limit: tuple[float, ...] = ()
+    lead: bool = False
+
+    @classmethod
+    def of_law(cls, law: DriveLaw, set_point_speeds: bool, lead: bool = False) -> "PositionDrive":
+        """The drive with the gains, limit and delay of a law."""
+        limit = tuple(law.limit) if np.isfinite(law.limit).any() else ()
+        gains = tuple(law.kp), tuple(law.kd)
+        return cls(
+            *gains, delay=law.delay, set_point_speeds=set_point_speeds, limit=limit, lead=lead
+        )
+
+    def limits(self, others: Array) -> Array:
+        """Torques (n,) at which it stops, `others` (n,) those of the motors; infinite: none."""
+        return np.minimum(others, self.limit) if self.limit else others
+
+    def sent_for(self, motion: Planned, robot: Robot) -> "Planned | LeadingSetPoints":
+        """What set points are taken from, so that `robot` plays `motion`."""
+        if not self.lead:
+            return motion
+        free = np.full(robot.n, np.inf)
+        law = DriveLaw(np.array(self.kp), np.array(self.kd), self.limits(free), self.delay)
+        step = 1.0 / self.command_rate
+        return LeadingSetPoints(motion, robot, law, step, self.set_point_speeds)
 
     def __post_init__(self) -> None:
         """Raise ConfigError for what no drive has."""
@@ -55,12 +82,12 @@ class PositionDrive:
         """When the newest set point at the instants `t` (T,) was sent [s]."""
         return np.floor(t * self.command_rate + _ROUNDING) / self.command_rate
 
-    def set_points(self, motion: Planned, t: Array) -> tuple[Array, Array]:
+    def set_points(self, motion: Moves, t: Array) -> tuple[Array, Array]:
         """Positions and speeds (T, n) of the newest set points sent by the instants `t` (T,)."""
         q, v, _ = motion.states(self.sent(t))
         return q, v if self.set_point_speeds else np.zeros_like(q)
 
-    def recorded(self, motion: Planned, t: Array) -> dict[str, Array]:
+    def recorded(self, motion: Moves, t: Array) -> dict[str, Array]:
         """Channels of the log: set points as they are sent, whenever they act."""
         q, v = self.set_points(motion, t)
         return {"q_cmd": q, "v_cmd": v} if self.set_point_speeds else {"q_cmd": q}
@@ -78,6 +105,7 @@ class PositionDrive:
             "command_rate": self.command_rate,
             "set_point_speeds": self.set_point_speeds,
             "limit": None if limit is None else named(limit),
+            "lead": self.lead,
         }
 
 

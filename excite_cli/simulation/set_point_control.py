@@ -11,7 +11,7 @@ import numpy as np
 from excite_cli.errors import ConfigError
 from excite_cli.robot.model import Array
 from excite_cli.simulation.build import Build
-from excite_cli.simulation.planned_motion import Planned
+from excite_cli.simulation.leading import Moves
 from excite_cli.simulation.position_drive import PositionDrive
 
 
@@ -32,7 +32,7 @@ class SetPointControl:
     )
 
     def __init__(
-        self, drive: PositionDrive, build: Build, motion: Planned, t: Array, encoder: float
+        self, drive: PositionDrive, build: Build, motion: Moves, t: Array, encoder: float
     ) -> None:
         if build.recorded or build.delay.any() or np.isfinite(build.reading).all(axis=1).any():
             raise ConfigError(

@@ -232,11 +232,17 @@ def simulate(
     dataset = Dataset(robot.joint_names[robot.base_joints :], tuple(runs), ("simulated",))
     drive, lag = None, {}
     if settings.drive is not None:
-        limit = robot.limits.effort if settings.torque_limits else None
-        drive = settings.drive.record(robot.joint_names, limit)
+        limit = settings.drive.limits(_of_motors(robot, settings))
+        limited = limit if np.isfinite(limit).any() else None
+        drive = settings.drive.record(robot.joint_names, limited)
         lag = {run.name: np.abs(run.extra["q_cmd"] - run.q).max(axis=0) for run in runs}
     truth = Truth(phi, planted, robot.joint_names, robot.sliding, drive)
     return Simulation(dataset, truth, tracking, lag)
+
+
+def _of_motors(robot: Robot, settings: SimulationSettings) -> Array:
+    """Torques (n,) at which motors stop; infinite where they do not."""
+    return robot.limits.effort if settings.torque_limits else np.full(robot.n, np.inf)
 
 
 def _dated(effect: Effect) -> bool:
@@ -279,8 +285,9 @@ def _takes(
     for name in names:
         run_id = RunId(name)
         build = assemble(robot, phi, run_id, planted, start, settings.covariates)
-        if settings.torque_limits:
-            build.clip = np.minimum(build.clip, robot.limits.effort)
+        build.clip = np.minimum(build.clip, _of_motors(robot, settings))
+        if settings.drive is not None:
+            build.clip = settings.drive.limits(build.clip)
         present = [p.effect.active(run_id) for p in planted]
         dated = any(_dated(p.effect) for p, here in zip(planted, present, strict=True) if here)
         active = (*present, start if dated else 0.0)
@@ -298,7 +305,7 @@ def _takes(
             extra = {"q_ref": motion.states(run.t)[0]}
         else:  # such robots report positions alone
             run = replace(run, tau=np.full_like(run.tau, np.nan), dq=None)
-            extra = settings.drive.recorded(motion, run.t)
+            extra = settings.drive.recorded(settings.drive.sent_for(motion, robot), run.t)
         extra |= {s.name: s.recorded(start + run.t, rng) for s in settings.covariates}
         run = replace(run, extra={**run.extra, **extra}, start=start, epoch=epoch)
         start = _next_start(run, settings)
@@ -310,7 +317,8 @@ def _played(
 ) -> MotorRecord:
     """One motion, led by a drive that follows set points or by the controller of torques."""
     if settings.drive is not None:
-        drive = SetPointControl(settings.drive, build, motion, reference.t, settings.encoder)
+        sent = settings.drive.sent_for(motion, build.robot)
+        drive = SetPointControl(settings.drive, build, sent, reference.t, settings.encoder)
         return play(build, plant, reference, drive)
     gains = gains_of(build, plant, reference, settings.bandwidth)
     followed = compensated(build, reference, settings.compensation)

@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from excite_cli.config.load_spec import load_spec
+from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.motion_formats.catalogue import read_own_motion
 from excite_cli.robot.model import build_robot
 from excite_cli.store.result_file import read_result
@@ -161,3 +162,29 @@ def test_an_exported_motion_is_simulated(excite: Program, two_motions: Run) -> N
     (run,) = answer["runs"]
     assert (run["name"], run["samples"]) == ("m", 600)
     assert max(run["tracking_error"].values()) < 0.02
+
+
+def test_set_points_that_lead(excite: Program, two_motions: Run) -> None:
+    """Those of the config's drives; refused where they are not known, and of what is no motion."""
+    drives = "measurement={torque: command, command: {kp: 400, kd: 20, delay: 0.01}}"
+    plan = ("optimize", SMOKE, *BRIEF, "--set", "sequence.motions=1", "-o", "set.h5")
+    excite.good(*plan, "--set", drives)
+    export = ("export", "set.h5", "-f", "csv", "-o", "lead.csv", "--rate", "500")
+    excite.good(*export, "--lead")
+    found = read_own_motion(excite.folder / "lead.csv")
+    (motion,) = read_result(excite.folder / "set.h5").motions
+    q, v, a = SERIES.states(found.t + 0.01 + 0.001, motion.coefficients)
+    torque = InverseDynamics(build_robot(load_spec(SMOKE).robot, SMOKE.parent)).torques(q, v, a)
+    set_points = q + (torque + 20.0 * v) / 400.0
+    np.testing.assert_allclose(found.q[:-6], set_points[:-6], atol=1e-9)
+    narrow = ("--set", "robot.limits.shoulder_pitch.position=[-2.2, 0.61]", "--overwrite")
+    excite.good(*plan, "--set", drives.replace("400", "40"), *narrow)
+    assert "would leave the joints' position limits" in excite.good(
+        *export, "--lead", "--overwrite").stderr  # fmt: skip
+    refused = excite.refused("export", two_motions.path, *export[2:4], "-o", "x.csv", "--lead")
+    assert "--lead: the config stored in " in refused
+    assert "it takes the gains of drives that follow set points" in refused
+    assert "--lead: lead.csv does not say which robot and drives" in excite.refused(
+        "export", "lead.csv", "-f", "npz", "--lead")  # fmt: skip
+    assert "--lead: it is about set points of motions, and this is a model" in excite.refused(
+        "export", SMOKE, "-f", "urdf", "--lead")  # fmt: skip

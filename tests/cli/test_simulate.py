@@ -125,9 +125,54 @@ def test_drives_that_follow_set_points(excite: Program, two_motions: Run) -> Non
     assert max(largest.values()) > np.abs(sent - q).max()
 
 
+OWN = (
+    "measurement={torque: command, command: {delay: 0.01, limit: {elbow: 90}, "
+    "kp: {shoulder_yaw: 400, shoulder_pitch: 400, elbow: 400, wrist_roll: 5, slide: 400}, "
+    "kd: {shoulder_yaw: 20, shoulder_pitch: 20, elbow: 20, wrist_roll: 0.1, slide: 20}}}"
+)
+
+
+def test_the_drives_of_the_config(excite: Program, two_motions: Run) -> None:
+    """Gains, limit and delay are taken unless options say otherwise; no option is needed."""
+    arguments = (
+        "simulate",
+        SMOKE,
+        two_motions.path,
+        "-o",
+        "own.h5",
+        "--motion",
+        "1",
+        "--overwrite",
+    )
+    own = (*arguments, "--set", OWN)
+
+    def drive(*more: str) -> dict[str, Any]:
+        excite.good(*own, *more)
+        with h5py.File(excite.folder / "own.h5") as file:
+            return dict(json.loads(file.attrs["truth"])["drive"])
+
+    found = drive()
+    assert (found["kp"]["elbow"], found["kd"]["slide"], found["delay"]) == (400.0, 20.0, 0.01)
+    assert (found["limit"]["elbow"], found["lead"]) == (90.0, False)
+    found = drive("--kp", "300", "--command-delay", "0", "--lead")
+    assert (found["kp"]["elbow"], found["kd"]["slide"], found["delay"]) == (300.0, 20.0, 0.0)
+    assert found["lead"] is True
+    excite.good(*own, "--control", "tracking")
+    with h5py.File(excite.folder / "own.h5") as file:
+        assert "drive" not in json.loads(file.attrs["truth"])
+    narrow = "robot.limits.shoulder_pitch.position=[-2.2, 0.9]"
+    said = excite.good(*own, "--lead", "--kp", "40", "--set", narrow).stderr
+    assert "would leave the joints' position limits" in said
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        (("--lead",), "--lead: only drives that follow set points have it. Add --control pos"),
+        (
+            ("--set", "measurement={torque: command, command: {kp: {elbow: 1}}}"),
+            "measurement.command.kp: no value for shoulder_yaw",
+        ),
         (("--kp", "20"), "--kp: only drives that follow set points have it. Add --control pos"),
         (("--command-delay", "0"), "--command-delay: only drives that follow set points"),
         (("--control", "position", "--kp", "9"), "--control position: --kd missing. Give the"),

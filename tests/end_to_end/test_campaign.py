@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import h5py
 import pytest
 
 from excite_cli import load_case
@@ -218,3 +219,32 @@ def test_what_cannot_be_asked(
     assert run.returncode == 2
     assert told in " ".join(run.stderr.split())
     assert not (folder / "campaign").exists()
+
+
+DRIVES = (
+    "measurement={torque: command, command: {"
+    "kp: {shoulder_yaw: 900, shoulder_pitch: 900, elbow: 400, wrist_roll: 20, slide: 900}, "
+    "kd: {shoulder_yaw: 20, shoulder_pitch: 20, elbow: 8, wrist_roll: 0.2, slide: 20}}}"
+)
+
+
+def test_a_simulated_robot_has_the_drives_of_the_config(folder: Path, cache: Path) -> None:
+    """No option: set points that lead the motions are sent, and an undeclared spring is named."""
+    place = ("campaign", "smoke.yaml", "-o", "drives", "--measure", "simulate", *ASKED[6:])
+    found = Installed(folder, cache)(
+        *place, "--set", DRIVES, "--effect", EFFECTS[0], "--json", "--max-rounds", "1"
+    )
+    assert found.stdout, found.stderr
+    answer = json.loads(found.stdout)
+    assert "spring on elbow" in answer["rounds"][-1]["learned"]["effects"], found.stderr
+    with h5py.File(next((folder / "drives").glob("*_log.h5"))) as file:
+        drive = json.loads(file.attrs["truth"])["drive"]
+        (run,) = file["runs"].values()
+        assert set(run) == {"t", "q", "q_cmd"}
+    assert drive["lead"] is True
+    assert (drive["kp"]["elbow"], drive["kd"]["wrist_roll"]) == (400.0, 0.2)
+    refused = Program(folder, cache)(
+        *place[:3], "none", *place[4:], "--set", "measurement={torque: command}"
+    )
+    assert refused.returncode == 2
+    assert "--measure simulate: it takes the gains of drives that follow" in refused.stderr
