@@ -48,6 +48,7 @@ PLANTED: Sequence[tuple[str, tuple[int, ...], Mapping[str, float], Sequence[floa
     ("asymmetric_friction", (WRIST_3,), {}, [1.0, 2.5]),
     ("stribeck_friction", (PAN,), {"stribeck_speed": 0.4}, [8.0]),
     ("load_dependent_friction", (LIFT,), {}, [0.2]),
+    ("gear_loss", (WRIST_1,), {}, [0.2, 0.1]),
     ("position_friction", (WRIST_1,), {"periods": 2.0, "power": 1.0}, [1.5, 1.0]),
     ("dahl_friction", (WRIST_2,), {"distance": 0.05}, [2.0]),
     ("friction_drift", (PAN,), {}, [-0.8, 0.6]),

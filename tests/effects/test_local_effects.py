@@ -19,6 +19,7 @@ from tests.robot.random_robots import random_robot
 ROBOT = random_robot(5, joints=3, branches=False, prismatic=False)
 SIGNALS = signals_of(ROBOT, 400)
 V, T = SIGNALS.v, SIGNALS.t
+LOSS = np.where(SIGNALS.load * V > 0, 0.15, 0.05)
 SIGN = np.sign(V[:, 1] + V[:, 2])
 
 
@@ -27,6 +28,7 @@ SIGN = np.sign(V[:, 1] + V[:, 2])
     [
         ("asymmetric_friction", (1,), (5.0, 2.0), [np.where(V[:, 1] > 0, 5.0, -2.0)]),
         ("load_dependent_friction", (1,), (0.07,), [0.07 * (abs(SIGNALS.load) * np.sign(V)).T[1]]),
+        ("gear_loss", (1,), (0.15, 0.05), [(LOSS * abs(SIGNALS.load) * np.sign(V)).T[1]]),
         ("friction_drift", (0,), (-0.2, 0.3), [T * (-0.2 * np.sign(V) + 0.3 * V).T[0]]),
         # Of the TX40: τ5 += fv6 v6 + fs6 sgn(v5 + v6), τ6 += fv6 v5 + fs6 sgn(v5 + v6).
         ("coupled_friction", (1, 2), (0.8, 1.5), [0.8 * V.T[j] + 1.5 * SIGN for j in (2, 1)]),
