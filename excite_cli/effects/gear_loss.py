@@ -33,7 +33,7 @@ class GearLoss(Effect):
         Parameter("driving", "N·m/N·m", 0.005, 0.3, nonnegative=True),
         Parameter("back_driving", "N·m/N·m", 0.005, 0.3, nonnegative=True),
     )
-    prior_cost: ClassVar = 2.0
+    prior_cost: ClassVar = 4.0
     refines: ClassVar = ("coulomb_friction",)
     same_as: ClassVar = ("load_dependent_friction", "torque_gain")
     # Beside one of them its losses would only be known up to a common part, of any sign.

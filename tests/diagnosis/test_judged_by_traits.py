@@ -37,7 +37,7 @@ STATED: Mapping[str, tuple[float, int, bool]] = {
     "asymmetric_friction": (4.0, 3, False),
     "stribeck_friction": (2.0, 2, False),
     "load_dependent_friction": (1.0, 2, True),
-    "gear_loss": (2.0, 2, False),
+    "gear_loss": (4.0, 2, False),
     "position_friction": (15.0, 2, False),
     "dahl_friction": (2.0, 2, False),
     "friction_drift": (15.0, 3, False),

@@ -79,6 +79,7 @@ def test_losses_of_driving_and_back_driving_are_told_apart(excite: Installed) ->
     (alias,) = answer["joint_aliases"]
     others = {each["kind"] for each in alias["others"]}
     assert others == {"load_dependent_friction", "torque_gain"}
+    assert not others & {each["kind"] for each in answer["absorbed"]}  # no weight tells them apart
 
 
 def test_a_sensor_that_saturates_hides_nothing_else_of_its_joint(excite: Installed) -> None:
