@@ -47,6 +47,7 @@ PLANTED: Sequence[tuple[str, tuple[int, ...], Mapping[str, float], Sequence[floa
     ("coulomb_friction", (ELBOW,), {}, [5.0]),
     ("asymmetric_friction", (WRIST_3,), {}, [1.0, 2.5]),
     ("stribeck_friction", (PAN,), {"stribeck_speed": 0.4}, [8.0]),
+    ("stribeck_friction", (ELBOW,), {"stribeck_speed": 0.3, "load_power": 1.0}, [0.1]),
     ("load_dependent_friction", (LIFT,), {}, [0.2]),
     ("gear_loss", (WRIST_1,), {}, [0.2, 0.1]),
     ("position_friction", (WRIST_1,), {"periods": 2.0, "power": 1.0}, [1.5, 1.0]),

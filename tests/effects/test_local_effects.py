@@ -1,5 +1,7 @@
 """Effects of single joints and pairs, against formulas written another way."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -57,12 +59,16 @@ def test_stribeck_friction_is_gone_at_three_times_its_speed() -> None:
     slow = Signals(**{**vars(SIGNALS), "v": np.tile(speeds[:, None], 3)})
     column = StribeckFriction((0,), {"stribeck_speed": 0.1}).columns(slow)[:, 0, 0]
     assert column == pytest.approx([1.0, 1.0, -1.0, 0.0, 0.0], abs=0.01)
+    # One that grows with the load is so much of that.
+    slow = replace(slow, load=SIGNALS.load[: len(speeds)])
+    by_load = StribeckFriction((0,), {"stribeck_speed": 0.1, "load_power": 1.0}).columns(slow)
+    assert by_load[:, 0, 0] == pytest.approx(np.abs(slow.load[:, 0]) * column)
     # Stribeck speeds follow the speeds seen.
     fastest = np.abs(SIGNALS.v[:, 2]).max()
     speeds = [shape["stribeck_speed"] for shape in StribeckFriction.grid(ROBOT, (2,), [SIGNALS])]
-    assert speeds == pytest.approx(fastest * np.geomspace(0.01, 0.3, 5))
+    assert speeds == pytest.approx(np.tile(fastest * np.geomspace(0.01, 0.3, 5), 2))  # both powers
     slow = Signals(**{**vars(SIGNALS), "v": SIGNALS.v * 1e-3})
-    assert [s["stribeck_speed"] for s in StribeckFriction.grid(ROBOT, (2,), [slow])] == [0.005]
+    assert {s["stribeck_speed"] for s in StribeckFriction.grid(ROBOT, (2,), [slow])} == {0.005}
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])

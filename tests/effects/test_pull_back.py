@@ -29,7 +29,7 @@ def _effects(kind: type[Effect], robot: Robot, signals: Signals) -> list[Effect]
     place = kind.places(robot)[-1]
     shapes = kind.grid(robot, place, [signals])
     if len(shapes) > 6 or not shapes:
-        shapes = [kind.planted(1.0, {})[0]]
+        shapes = [kind.planted(1.0, {})[0], *shapes[-1:]]
     return [kind(place, shape) for shape in shapes]
 
 
