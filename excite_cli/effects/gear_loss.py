@@ -48,6 +48,13 @@ class GearLoss(Effect):
         dry = np.abs(load) * smooth_sign(signals.v[:, j])
         return 0.5 * np.stack([dry + load, dry - load], axis=-1)[:, None]
 
+    def nearest(self, values: Array, covariance: Array) -> Array:
+        """Themselves: a gear loses both ways, and with a loss below zero other names fit as well.
+
+        Beside a torque that saturates, losses of −0.13 and 0.17 stood for friction of 0.07.
+        """
+        return values
+
     def in_c(self, values: Array, columns: Sequence[str]) -> str:
         """(μ₁ + μ₂)/2 |load_j| s + (μ₁ − μ₂)/2 load_j."""
         j = self.joints[0]

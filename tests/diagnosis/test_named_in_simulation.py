@@ -93,25 +93,6 @@ def test_no_gear_gives_energy_so_that_a_larger_gain_is_one() -> None:
     }
 
 
-def test_stribeck_friction_that_grows_with_the_load_is_told_so() -> None:
-    rubs = planted("load_dependent_friction", PITCH, 0.1)
-    peak = plant(
-        kind_named("stribeck_friction"), (PITCH,), 0.2, {"stribeck_speed": 0.15, "load_power": 1.0}
-    )
-    declared = "[{kind: viscous_friction, joints: all}, {kind: coulomb_friction, joints: all}]"
-    data = played([rubs, peak], (1, 2, 3, 4), 4.0, declared=declared)
-    found = {each.effect.kind: each for each in told(data, GEAR, f"effects={declared}").effects}
-    assert set(found) == {"load_dependent_friction", "stribeck_friction"}
-    stribeck = found["stribeck_friction"]
-    assert stribeck.effect.shape["load_power"] == 1.0
-    assert stribeck.effect.shape["stribeck_speed"] == pytest.approx(0.15, rel=0.15)
-    assert stribeck.parameters["excess"].value == pytest.approx(0.2, rel=0.1)
-    assert stribeck.parameters["excess"].unit == "N·m/N·m"
-    assert found["load_dependent_friction"].parameters["ratio"].value == pytest.approx(
-        0.1, abs=0.01
-    )
-
-
 def test_another_form_of_memory_gets_no_other_name() -> None:
     found = diagnosed(*rubbing(MaxwellSlip, ELBOW, 5.0, 0.04))
     assert set(names(found)) <= {("dahl_friction", "elbow")}

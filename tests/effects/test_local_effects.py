@@ -66,9 +66,9 @@ def test_stribeck_friction_is_gone_at_three_times_its_speed() -> None:
     # Stribeck speeds follow the speeds seen.
     fastest = np.abs(SIGNALS.v[:, 2]).max()
     speeds = [shape["stribeck_speed"] for shape in StribeckFriction.grid(ROBOT, (2,), [SIGNALS])]
-    assert speeds == pytest.approx(np.tile(fastest * np.geomspace(0.01, 0.3, 5), 2))  # both powers
+    assert speeds == pytest.approx(fastest * np.geomspace(0.01, 0.3, 5))
     slow = Signals(**{**vars(SIGNALS), "v": SIGNALS.v * 1e-3})
-    assert {s["stribeck_speed"] for s in StribeckFriction.grid(ROBOT, (2,), [slow])} == {0.005}
+    assert [s["stribeck_speed"] for s in StribeckFriction.grid(ROBOT, (2,), [slow])] == [0.005]
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])

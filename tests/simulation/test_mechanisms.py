@@ -87,6 +87,14 @@ FORMULAS: list[tuple[str, float, dict[str, float], Callable[..., Array], Callabl
         *(lambda q, v, a, load: 3.0 * np.exp(-((v / 0.2) ** 2)) * np.sign(v), rms, 0.05),
     ),
     (
+        *("stribeck_friction", 0.1, {"stribeck_speed": 0.2, "load_power": 1.0}),
+        *(
+            lambda q, v, a, load: 0.1 * np.exp(-((v / 0.2) ** 2)) * abs(load) * np.sign(v),
+            rms,
+            0.05,
+        ),
+    ),
+    (
         *("load_dependent_friction", 0.1, {}),
         *(lambda q, v, a, load: 0.1 * np.abs(load) * np.sign(v), rms, 0.05),
     ),
