@@ -30,6 +30,7 @@ REFINEMENTS = (
     "nonlinear_viscous_friction",
     "stribeck_friction",
     "load_dependent_friction",
+    "gear_loss",
     "position_friction",
     "dahl_friction",
     "friction_drift",

@@ -49,7 +49,9 @@ def absorbed_effects(
     factor, schur = evidence.factor(chosen), evidence.schur(chosen)
     found: dict[Place, ConfoundedCandidate] = {}
     effects = [candidates[i].effect for i in chosen]
+    # A part of another name of what is named is reported with that name (`joint_aliases`).
     taken = {effect.place for effect in effects}
+    taken |= {effect.place._replace(kind=kind) for effect in effects for kind in effect.same_as}
     names = [model.base.names[k] for k in model.base.selection]
     for effect in (*model.declared, *effects):
         where = "+".join(joint_names[j] for j in effect.joints)

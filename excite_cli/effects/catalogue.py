@@ -41,6 +41,7 @@ EFFECTS: Registry[Effect] = Registry(
         "asymmetric_friction": "asymmetric_friction:AsymmetricFriction",
         "stribeck_friction": "stribeck_friction:StribeckFriction",
         "load_dependent_friction": "load_dependent_friction:LoadDependentFriction",
+        "gear_loss": "gear_loss:GearLoss",
         "position_friction": "position_friction:PositionFriction",
         "dahl_friction": "dahl_friction:DahlFriction",
         "friction_drift": "friction_drift:FrictionDrift",

@@ -218,19 +218,21 @@ def _of_joint(model: IdentifiedModel, values: JointValues, j: int) -> dict[str, 
         "friction_viscous": own["viscous_friction"][1] if "viscous_friction" in own else 0.0,
     }
     stribeck, load = own.get("stribeck_friction"), own.get("load_dependent_friction")
+    by_load = stribeck is not None and stribeck[0].shape.get("load_power") == 1.0
     if stribeck is not None:
         found |= {
-            "friction_stribeck": stribeck[1],
+            "friction_stribeck": 0.0 if by_load else stribeck[1],
             "dtheta_stribeck": float(stribeck[0].shape["stribeck_speed"]),
             "alpha": _EXPONENT,
         }
-    if load is not None:
-        found["load_friction_base"] = 0.5 * load[1]
+    carried = load is not None or by_load
+    if carried:
+        found["load_friction_base"] = 0.5 * load[1] if load is not None else 0.0
         if stribeck is not None:
-            found["load_friction_stribeck"] = 0.0
+            found["load_friction_stribeck"] = 0.5 * stribeck[1] if by_load else 0.0
     name = {(False, False): "m1", (True, False): "m2", (False, True): "m3", (True, True): "m4"}
     return {
-        "model": name[stribeck is not None, load is not None],
+        "model": name[stribeck is not None, carried],
         **found,
         "kp": float(drive.kp[j]),
         "damping": float(drive.kd[j]),

@@ -37,6 +37,7 @@ STATED: Mapping[str, tuple[float, int, bool]] = {
     "asymmetric_friction": (4.0, 3, False),
     "stribeck_friction": (2.0, 2, False),
     "load_dependent_friction": (1.0, 2, True),
+    "gear_loss": (4.0, 2, False),
     "position_friction": (15.0, 2, False),
     "dahl_friction": (2.0, 2, False),
     "friction_drift": (15.0, 3, False),
@@ -70,6 +71,7 @@ REFINED: Mapping[str, tuple[str, ...]] = {
     "coupled_friction": STRAIGHT,
     "asymmetric_friction": ("coulomb_friction", "torque_offset"),
     "load_dependent_friction": ("coulomb_friction",),
+    "gear_loss": ("coulomb_friction",),
     "position_friction": ("coulomb_friction",),
 }
 

@@ -57,6 +57,42 @@ def test_dahl_friction_is_named_with_its_size_and_distance() -> None:
     assert found.after.mean_relative_moving < 0.3 * found.before.mean_relative_moving
 
 
+GEAR = (
+    "viscous_friction,coulomb_friction,load_dependent_friction,gear_loss,torque_gain,torque_offset,"
+    "stribeck_friction,position_friction,dahl_friction,spring"
+)
+
+
+def on_pitch(*effects: PlantedEffect) -> dict[str, dict[str, float]]:
+    """Parameters of what is named, by its kind; all of it on the second joint."""
+    declared = "[{kind: viscous_friction, joints: all}, {kind: coulomb_friction, joints: all}]"
+    data = played(effects, (1, 2, 3, 4), 4.0, declared=declared)
+    found = told(data, GEAR, f"effects={declared}").effects
+    assert {each.effect.joints for each in found} == {("shoulder_pitch",)}
+    return {
+        each.effect.kind: {name: value.value for name, value in each.parameters.items()}
+        for each in found
+    }
+
+
+def test_a_gear_that_loses_more_where_it_drives_is_told_by_both_losses() -> None:
+    found = on_pitch(planted("gear_loss", PITCH, 0.15, back_driving=0.05))
+    assert found == {"gear_loss": pytest.approx({"driving": 0.15, "back_driving": 0.05}, abs=0.01)}
+
+
+def test_a_gear_that_loses_the_same_both_ways_has_the_simpler_name() -> None:
+    found = on_pitch(planted("gear_loss", PITCH, 0.1, back_driving=0.1))
+    assert found == {"load_dependent_friction": {"ratio": pytest.approx(0.1, abs=0.01)}}
+
+
+def test_no_gear_gives_energy_so_that_a_larger_gain_is_one() -> None:
+    rubs, gain = planted("load_dependent_friction", PITCH, 0.05), planted("torque_gain", PITCH, 0.1)
+    assert on_pitch(rubs, gain) == {
+        "load_dependent_friction": {"ratio": pytest.approx(0.05, abs=0.01)},
+        "torque_gain": {"gain": pytest.approx(0.1, abs=0.01)},
+    }
+
+
 def test_another_form_of_memory_gets_no_other_name() -> None:
     found = diagnosed(*rubbing(MaxwellSlip, ELBOW, 5.0, 0.04))
     assert set(names(found)) <= {("dahl_friction", "elbow")}

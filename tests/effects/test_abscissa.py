@@ -61,6 +61,15 @@ def test_ripple_repeats_within_its_period() -> None:
     found = effect.abscissa(SIGNALS)
     assert found is not None
     assert np.array_equal(found.values, effect.columns(SIGNALS)[:, 0, 0])
+    # Of losses that differ, a line for each.
+    effect = kind_named("gear_loss")((2,))
+    found = effect.abscissa(SIGNALS)
+    assert found is not None
+    sliding = np.abs(SIGNALS.v[:, 2]) > 0.01
+    driving = (SIGNALS.load * SIGNALS.v)[:, 2] > 0.0
+    torque = effect.columns(SIGNALS)[:, 0] @ [0.15, 0.05]
+    slopes = np.where(driving, 0.15, 0.05)
+    assert torque[sliding] == pytest.approx((slopes * found.values)[sliding])
     # Effects of users need none.
     assert Own((0,)).abscissa(SIGNALS) is None
 

@@ -1,5 +1,7 @@
 """Effects of single joints and pairs, against formulas written another way."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -19,6 +21,7 @@ from tests.robot.random_robots import random_robot
 ROBOT = random_robot(5, joints=3, branches=False, prismatic=False)
 SIGNALS = signals_of(ROBOT, 400)
 V, T = SIGNALS.v, SIGNALS.t
+LOSS = np.where(SIGNALS.load * V > 0, 0.15, 0.05)
 SIGN = np.sign(V[:, 1] + V[:, 2])
 
 
@@ -27,6 +30,7 @@ SIGN = np.sign(V[:, 1] + V[:, 2])
     [
         ("asymmetric_friction", (1,), (5.0, 2.0), [np.where(V[:, 1] > 0, 5.0, -2.0)]),
         ("load_dependent_friction", (1,), (0.07,), [0.07 * (abs(SIGNALS.load) * np.sign(V)).T[1]]),
+        ("gear_loss", (1,), (0.15, 0.05), [(LOSS * abs(SIGNALS.load) * np.sign(V)).T[1]]),
         ("friction_drift", (0,), (-0.2, 0.3), [T * (-0.2 * np.sign(V) + 0.3 * V).T[0]]),
         # Of the TX40: τ5 += fv6 v6 + fs6 sgn(v5 + v6), τ6 += fv6 v5 + fs6 sgn(v5 + v6).
         ("coupled_friction", (1, 2), (0.8, 1.5), [0.8 * V.T[j] + 1.5 * SIGN for j in (2, 1)]),
@@ -55,6 +59,10 @@ def test_stribeck_friction_is_gone_at_three_times_its_speed() -> None:
     slow = Signals(**{**vars(SIGNALS), "v": np.tile(speeds[:, None], 3)})
     column = StribeckFriction((0,), {"stribeck_speed": 0.1}).columns(slow)[:, 0, 0]
     assert column == pytest.approx([1.0, 1.0, -1.0, 0.0, 0.0], abs=0.01)
+    # One that grows with the load is so much of that.
+    slow = replace(slow, load=SIGNALS.load[: len(speeds)])
+    by_load = StribeckFriction((0,), {"stribeck_speed": 0.1, "load_power": 1.0}).columns(slow)
+    assert by_load[:, 0, 0] == pytest.approx(np.abs(slow.load[:, 0]) * column)
     # Stribeck speeds follow the speeds seen.
     fastest = np.abs(SIGNALS.v[:, 2]).max()
     speeds = [shape["stribeck_speed"] for shape in StribeckFriction.grid(ROBOT, (2,), [SIGNALS])]

@@ -14,7 +14,7 @@ from tests.registries import forget
 from tests.trust.conftest import SMOKE
 from tests.trust.in_process import excite
 
-OURS = 28
+OURS = 29
 GOOD = """
 import numpy as np
 from excite_cli.effects.spring import Spring

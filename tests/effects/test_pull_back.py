@@ -24,12 +24,17 @@ ROBOTS = [
 ]
 
 
+# Shapes that no search tries.
+DECLARED = {"stribeck_friction": [{"stribeck_speed": 0.4, "load_power": 1.0}]}
+
+
 def _effects(kind: type[Effect], robot: Robot, signals: Signals) -> list[Effect]:
     """On the last place, with every shape; of a periodogram's many, two."""
     place = kind.places(robot)[-1]
     shapes = kind.grid(robot, place, [signals])
     if len(shapes) > 6 or not shapes:
         shapes = [kind.planted(1.0, {})[0]]
+    shapes += DECLARED.get(kind.kind, [])
     return [kind(place, shape) for shape in shapes]
 
 

@@ -63,6 +63,23 @@ def test_what_only_comes_near_is_told_as_an_approximation() -> None:
         assert each["approximates"]["covariates"] == ["q[panda_joint4]"]
 
 
+def test_losses_of_driving_and_back_driving_are_told_apart(excite: Installed) -> None:
+    brief = ("--set", "optimizer.max_iterations=40", "--motions", "3", "--seed", "3")
+    excite.answer("optimize", SMOKE, *brief, "-o", "m.h5")
+    excite.answer(
+        "simulate", SMOKE, "m.h5", "-o", "log.h5", "--seed", "5",
+        "--effect", "gear_loss@shoulder_pitch=0.15,back_driving:0.05",
+    )  # fmt: skip
+    answer = excite.answer("diagnose", SMOKE, "log.h5", "-o", "found.h5")
+    (found,) = answer["effects"]
+    assert (found["kind"], found["joints"]) == ("gear_loss", ["shoulder_pitch"])
+    losses = {name: each["value"] for name, each in found["parameters"].items()}
+    assert losses == pytest.approx({"driving": 0.15, "back_driving": 0.05}, abs=0.005)
+    # A gain of the drive looks the same, and no weight tells them apart.
+    absorbed = {(each["kind"], *each["joints"]) for each in answer["absorbed"]}
+    assert ("torque_gain", "shoulder_pitch") not in absorbed
+
+
 def test_a_sensor_that_saturates_hides_nothing_else_of_its_joint(excite: Installed) -> None:
     ratio, level = 0.07, 12.0  # N·m, of 24 that the motions need
     brief = ("--set", "optimizer.max_iterations=40", "--motions", "3", "--seed", "3")

@@ -179,6 +179,16 @@ def test_the_model_is_the_least_that_has_the_friction(more: tuple[str, ...], mod
     assert notes == ("one set for each joint: bam.model.load_model_from_dict(data[joint])",)
 
 
+def test_a_peak_that_grows_with_the_load_is_bams_own() -> None:
+    robot = random_robot(1, joints=1, prismatic=False)
+    shape = {"stribeck_speed": 0.2, "load_power": 1.0}
+    model = identified(robot, EffectSpec(kind="stribeck_friction", shape=shape))
+    one = Drive(np.ones(1), np.zeros(1), np.full(1, np.inf), np.zeros(1))
+    found = json.loads(bam(robot, model, joint_values(robot, model, one)).text)
+    assert (found["model"], found["friction_stribeck"], found["load_friction_base"]) == ("m4", 0, 0)
+    assert found["load_friction_stribeck"] == pytest.approx(0.05)
+
+
 def test_one_joint_is_one_file_of_bam_and_what_it_cannot_hold_is_reported() -> None:
     robot = random_robot(1, joints=1, prismatic=False)
     model = identified(robot, EffectSpec(kind="coulomb_friction"), EffectSpec(kind="ripple"))

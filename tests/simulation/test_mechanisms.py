@@ -66,6 +66,10 @@ def peak(x: Array) -> float:
     return float(np.abs(x).max())
 
 
+def lossy(driving: float, back_driving: float, v: Array, load: Array) -> Array:
+    return np.where(load * v > 0, driving, back_driving) * np.abs(load) * np.sign(v)
+
+
 # An effect on the elbow, what it is from q, v, a and the rigid load there, and how exactly.
 FORMULAS: list[tuple[str, float, dict[str, float], Callable[..., Array], Callable, float]] = [
     ("coulomb_friction", 4.0, {}, lambda q, v, a, load: 4.0 * np.sign(v), peak, 0.08),
@@ -83,8 +87,20 @@ FORMULAS: list[tuple[str, float, dict[str, float], Callable[..., Array], Callabl
         *(lambda q, v, a, load: 3.0 * np.exp(-((v / 0.2) ** 2)) * np.sign(v), rms, 0.05),
     ),
     (
+        *("stribeck_friction", 0.1, {"stribeck_speed": 0.2, "load_power": 1.0}),
+        *(
+            lambda q, v, a, load: 0.1 * np.exp(-((v / 0.2) ** 2)) * abs(load) * np.sign(v),
+            rms,
+            0.05,
+        ),
+    ),
+    (
         *("load_dependent_friction", 0.1, {}),
         *(lambda q, v, a, load: 0.1 * np.abs(load) * np.sign(v), rms, 0.05),
+    ),
+    (
+        *("gear_loss", 0.15, {"back_driving": 0.05}),
+        *(lambda q, v, a, load: lossy(0.15, 0.05, v, load), rms, 0.05),
     ),
     (
         *("nonlinear_viscous_friction", 8.0, {"power": 2.0}),
