@@ -59,7 +59,7 @@ def test_named_numbers_runs_and_takes(robot: Robot) -> None:
     (friction,) = parse_planted(
         "stribeck_friction@elbow_joint=3,stribeck_speed:0.05;runs:motion_1", robot, RUNS
     )
-    assert friction.effect.shape == {"stribeck_speed": 0.05}
+    assert friction.effect.shape == {"stribeck_speed": 0.05, "load_power": 0.0}
     assert friction.effect.runs == ("motion_1_take_1", "motion_1_take_2")
     (load,) = parse_planted("payload@all=1.5;runs:motion_2|motion_1_take_2", robot, RUNS)
     assert set(load.effect.runs) == {"motion_2", "motion_1_take_2"}
