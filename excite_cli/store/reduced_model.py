@@ -87,8 +87,11 @@ def reduced_model(found: Diagnosis, robot: Robot, holds: Holds) -> ReducedModel 
     columns = _columns(found, robot, base.rank)
     whole = [column for column in columns if column.chosen]
     kept = [each for each in whole if each.held_by(holds, each.values)]
+    joined: list[_Column] = []
     while True:
-        kept = [*kept, *_joining(columns, kept, whole)]
+        more = [each for each in _joining(columns, kept, whole) if each not in joined]
+        joined += more
+        kept = [*kept, *more]
         reduced = _fitted(found, robot, base, kept, whole)
         if reduced is None:
             return None

@@ -99,6 +99,13 @@ def test_friction_that_was_tested_joins_on_joints_that_lose_an_effect(log: Path)
     assert of_kinds(reduced)["coulomb_friction", (elbow,)][0] > 0.1
     assert ("coulomb_friction", (slide,)) not in of_kinds(reduced)
 
+    def no_dry_friction(effect: Effect, values: Array) -> bool:
+        return effect.kind != "coulomb_friction" and holds(effect, values)
+
+    never = reduced_model(without, robot, no_dry_friction)
+    assert never is not None
+    assert ("coulomb_friction", (elbow,)) not in of_kinds(never)
+
 
 def test_effects_that_a_refit_turns_are_left_out_too(log: Path) -> None:
     """A simulator that has friction below a size only: it goes as soon as it grows beyond."""
