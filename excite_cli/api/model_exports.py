@@ -8,6 +8,7 @@ import numpy as np
 
 from excite_cli.atomic import write_text_atomically
 from excite_cli.config.load_spec import files_of_config
+from excite_cli.diagnosis.reduced_model import reduced_model
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.pseudo_inertia import UNSURE, body_lengths, inertial_prior
 from excite_cli.dynamics.regressor import standard_parameters
@@ -36,7 +37,6 @@ from excite_cli.shown.note import Level, Note, Tell
 from excite_cli.store.diagnosis_file import read_diagnosis
 from excite_cli.store.fit_file import read_fit
 from excite_cli.store.model_file import consistent_model, read_model
-from excite_cli.store.reduced_model import reduced_model
 from excite_cli.store.score_file import read_thresholds
 
 
@@ -164,7 +164,7 @@ def uncertain_model(stored: StoredModel) -> UncertainModel:
         model, estimate = fit.best_model, fit.model
         root = from_covariance(base, prior, fit.covariance)
     elif stored.what == "diagnosis":
-        reduced = reduced_model(read_diagnosis(stored.path), robot, mjcf.holds)
+        reduced = reduced_model(read_diagnosis(stored.path), robot, mjcf.holds, stored.path)
         if reduced is None:
             raise ConfigError(
                 f"{stored.path}: no robot like its model can exist. Diagnose again with more data."
@@ -245,7 +245,7 @@ def _held(stored: StoredModel, kind: str) -> tuple[IdentifiedModel, tuple[Effect
     def holds(effect: Effect, values: Array) -> bool:
         return _HOLDS[kind](effect, values) or mjcf.holds(effect, values)
 
-    reduced = reduced_model(read_diagnosis(stored.path), stored.robot, holds)
+    reduced = reduced_model(read_diagnosis(stored.path), stored.robot, holds, stored.path)
     return (stored.model, ()) if reduced is None else (reduced.model, reduced.dropped)
 
 

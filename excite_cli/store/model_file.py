@@ -11,6 +11,7 @@ from excite_cli.config.load_spec import load_spec, parse_spec
 from excite_cli.config.spec import IdentifiedSpec, Spec
 from excite_cli.diagnosis.candidates import effect_of
 from excite_cli.diagnosis.records import EffectRecord
+from excite_cli.diagnosis.reduced_model import reduced_model
 from excite_cli.dynamics.regressor import standard_parameter_names
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import kind_named
@@ -24,7 +25,6 @@ from excite_cli.robot.model import Robot, build_measured_robot
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis
 from excite_cli.store.fit_file import is_fit, read_fit
 from excite_cli.store.own_file import is_own
-from excite_cli.store.reduced_model import reduced_model
 
 _TEXT = {".yaml", ".yml"}
 
@@ -89,7 +89,7 @@ def consistent_model(stored: StoredModel) -> IdentifiedModel:
     """
     if stored.consistent is not None or stored.what != "diagnosis":
         return stored.consistent or stored.model
-    reduced = reduced_model(read_diagnosis(stored.path), stored.robot, lambda *_: True)
+    reduced = reduced_model(read_diagnosis(stored.path), stored.robot, lambda *_: True, stored.path)
     return stored.model if reduced is None else reduced.model
 
 

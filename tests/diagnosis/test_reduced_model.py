@@ -8,11 +8,12 @@ import pytest
 
 from excite_cli import diagnose, identify, load_case, load_problem, plan, simulate
 from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.diagnosis.reduced_model import ReducedModel, reduced_model
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.effects.base import Effect
+from excite_cli.errors import FileError
 from excite_cli.export.mjcf import holds
 from excite_cli.robot.model import Array, Robot
-from excite_cli.store.reduced_model import ReducedModel, reduced_model
 
 CONFIG = Path(__file__).resolve().parents[2] / "configs" / "smoke.yaml"
 SMALL = [
@@ -131,3 +132,13 @@ def test_it_is_what_identify_finds(log: Path) -> None:
     assert mine.keys() == other.keys()
     for place, value in other.items():
         assert mine[place] == pytest.approx(value, rel=0.1, abs=0.05), place
+
+
+def test_a_covariance_of_other_effects_is_refused(log: Path) -> None:
+    found, robot = diagnosed(log, STRAIGHT)
+    known = found.information
+    short = replace(found, information=replace(known, factor=known.factor[:, :-1]))
+    other = replace(found, information=replace(known, model=known.model[1:]))
+    for edited in (short, other):
+        with pytest.raises(FileError, match=r"^d\.h5: its covariance is of other effects than"):
+            reduced_model(edited, robot, holds, Path("d.h5"))

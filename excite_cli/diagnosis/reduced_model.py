@@ -25,6 +25,7 @@ from excite_cli.dynamics.pseudo_inertia import body_lengths, inertial_prior
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import EVERYDAY_FRICTION
+from excite_cli.errors import FileError
 from excite_cli.identification.consistent import consistent_near_prior
 from excite_cli.identification.factors import triangle_of
 from excite_cli.identification.fit import effect_parameters
@@ -81,9 +82,20 @@ class _Column:
         return self.free or holds(self.effect, np.where(signs, np.abs(values), values))
 
 
-def reduced_model(found: Diagnosis, robot: Robot, holds: Holds) -> ReducedModel | None:
-    """The model with the effects that a simulator `holds`; None if there is no such."""
+def reduced_model(
+    found: Diagnosis, robot: Robot, holds: Holds, where: object = "the diagnosis"
+) -> ReducedModel | None:
+    """The model with the effects that a simulator `holds`; None if there is no such.
+
+    `where` it was read from is what an error names.
+
+    Raises
+    ------
+    FileError
+        What the diagnosis knows of its model is of other effects, or of another robot.
+    """
     base = find_base_parameters(robot)
+    _require_own(found, base.rank, where)
     columns = _columns(found, robot, base.rank)
     whole = [column for column in columns if column.chosen]
     kept = [each for each in whole if each.held_by(holds, each.values)]
@@ -101,6 +113,19 @@ def reduced_model(found: Diagnosis, robot: Robot, holds: Holds) -> ReducedModel 
             gone = tuple(each.effect for each in whole if each not in kept)
             return replace(reduced, dropped=gone)
         kept = left
+
+
+def _require_own(found: Diagnosis, rank: int, where: object) -> None:
+    """Raise FileError unless the information is that of the model."""
+    information = found.information
+    told = {_key(r) for r in (*found.declared, *(named.effect for named in found.effects))}
+    records = (*information.model, *information.rivals, *information.possible)
+    size = rank + sum(len(record.values) for record in records)
+    same = told == {_key(record) for record in information.model}
+    if not (same and information.rank == rank and information.factor.shape[1] == size):
+        raise FileError(
+            f"{where}: its covariance is of other effects than its model. Diagnose again."
+        )
 
 
 def _columns(found: Diagnosis, robot: Robot, rank: int) -> list[_Column]:
