@@ -219,6 +219,8 @@ def friction(answer: Answer) -> str:
     everywhere = list(answer.content["error"]["after"]["relative_moving"])
     viscous, dry, one_sided = (answer.joints(kind) for kind in _FRICTION)
     both = [j for j in everywhere if j in viscous and (j in dry or j in one_sided)]
+    if not both:
+        return f"viscous friction on {told(viscous)}, Coulomb friction on {told(dry)}"
     where = "all joints" if both == everywhere else told(both)
     return f"friction on {where}" + f" (asymmetric on {told(one_sided)})" * bool(one_sided)
 

@@ -296,13 +296,7 @@ def shapes_around(effect: Effect, signals: Sequence[Signals]) -> list[dict]:
     A grid names an effect, it does not measure it. Of a shape that is one of few (a power, a
     direction) all others: what was found first may have stood for something that is in by now.
     """
-    found = [dict(effect.shape)]
-    for name, value in effect.shape.items():
-        found += [
-            {**effect.shape, name: float(value + sign * change)}
-            for change in effect.finer_steps(name, signals)
-            for sign in (-1.0, 1.0)
-        ]
+    found = [dict(effect.shape), *effect.shapes_near(signals)]
     if len(found) > 1:
         return found
     if effect.covariate:

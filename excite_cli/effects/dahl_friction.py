@@ -1,8 +1,12 @@
-"""Dry friction with memory (Dahl): after a reversal it builds up over a distance.
+"""Dry friction with memory (Dahl, LuGre): after a reversal it builds up over a distance.
 
-With the bristle state z, s the direction of motion, and d the `distance`,
+With the bristle state z, s the direction of motion, d the `distance` and r the `damping`,
 
-    τ_j = f (z − sgn v_j),    dz = (s − z) |dq_j| / d.
+    τ_j = f (z − sgn v_j)(1 − r |v_j|),    dz = (s − z) |dq_j| / d.
+
+r is zero for Dahl's friction. LuGre's (Canudas de Wit et al. 1995) has a bristle of stiffness
+σ₀ = f/d that is damped by σ₁ = f r, with the torque σ₁ (s − z) |v|: the faster a reversal, the more
+of the memory is gone. r and d are nearly what data show apart; a time constant r d is not.
 
 It deviates from the Coulomb friction beside it, and vanishes in steady sliding: Coulomb friction
 stays what data sheets say. Friction that is f z altogether, Dahl's solid friction of exponent one
@@ -45,6 +49,12 @@ from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 
 _DISTANCES = 5e-4, 0.5  # rad
+# Dampings that are tried, in units of one over the speed at which a joint comes through the
+# distance after a reversal, and distances with each: one without damping is too short for it by up
+# to five, and no step of one of them alone leads out of that.
+_DAMPINGS = 0.25, 0.5, 1.0
+_LONGER = 1.0, 2.0, 4.0
+_RATIOS = 0.5, 0.8, 1.25, 2.0
 _SHARES = np.geomspace(1e-3, 0.25, 7)  # of the range; neighbours overlap by 0.9
 _FINER = (1.4, 1.25, 1.15, 1.08, 1.03, 1.01)
 _STANDING = 0.01  # rad/s: less may be noise
@@ -54,50 +64,84 @@ _DRAWN = 6.0  # distances beyond which nothing is left of a reversal
 
 
 class DahlFriction(Effect):
-    """τ_j = f (z − sgn v_j), f ≥ 0, with z following the direction of motion over `distance`."""
+    """τ_j = f (z − sgn v_j)(1 − r |v_j|), f ≥ 0, z following the direction over `distance`."""
 
     kind: ClassVar = "dahl_friction"
     over_time: ClassVar = True
-    title: ClassVar = "dry friction with memory (Dahl)"
+    title: ClassVar = "dry friction with memory (Dahl, LuGre)"
     signature: ClassVar = "after a reversal friction builds up over a distance instead of jumping"
     function_of: ClassVar = ("speed",)
     friction: ClassVar = True
     parameters: ClassVar = (
         Parameter("friction", "N·m", 0.05, 300.0, nonnegative=True, part_of_torque=True),
     )
-    shapes: ClassVar = (Parameter("distance", "rad", *_DISTANCES),)
-    defaults: ClassVar = {"distance": 0.03}
+    shapes: ClassVar = (
+        Parameter("distance", "rad", *_DISTANCES),
+        Parameter("damping", "s/rad", 0.0, 20.0, nonnegative=True),
+    )
+    defaults: ClassVar = {"distance": 0.03, "damping": 0.0}
     prior_cost: ClassVar = 2.0
     refines: ClassVar = ("coulomb_friction",)
 
     @classmethod
     def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:
-        """Seven distances from 0.1 to 25 % of the travelled range, within 0.5 mrad to 0.5 rad."""
+        """Seven distances from 0.1 to 25 % of the travelled range, within 0.5 mrad to 0.5 rad.
+
+        A damping is sought once the friction is found.
+        """
         q = [s.q[:, joints[0]] for s in signals if len(s.q)]
         travelled = max(x.max() for x in q) - min(x.min() for x in q) if q else 1.0
         distances = np.unique(np.clip(_SHARES * travelled, *_DISTANCES))
-        return [{"distance": float(distance)} for distance in distances]
+        return [{"distance": float(distance), "damping": 0.0} for distance in distances]
 
     def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
         """Many: where friction stands far above the noise, a few per cent of it are seen."""
         return steps_by_ratio(self.shape[name], _FINER)
+
+    def shapes_near(self, signals: Sequence[Signals]) -> list[dict]:
+        """Without a damping, some with one; with one, none, and both shapes changed at once."""
+        near = super().shapes_near(signals)
+        distance, known = self.shape["distance"], self._damping
+        if known:
+            both = [(a * distance, b * known) for a in _RATIOS for b in _RATIOS]
+            return near + [{"distance": d, "damping": r} for d, r in [*both, (distance, 0.0)]]
+        reversing = np.sqrt(2.0 * self._acceleration(signals) * distance)
+        return near + [
+            {"distance": longer * distance, "damping": float(damping / reversing)}
+            for longer in _LONGER
+            for damping in _DAMPINGS
+            if reversing > 0.0
+        ]
+
+    def _acceleration(self, signals: Sequence[Signals]) -> float:
+        """RMS [rad/s²]."""
+        every = np.concatenate([s.a[:, self.joints[0]] for s in signals])
+        return float(np.sqrt(np.mean(np.square(every)))) if len(every) else 0.0
 
     def forgets_over(self) -> tuple[tuple[int, float], ...]:
         """Four distances: of what was before a record, 2 % are left then."""
         return tuple((j, _FORGOTTEN * self.shape["distance"]) for j in self.joints)
 
     def columns(self, signals: Signals) -> Array:
-        """z − sgn v_j, (T, 1, 1)."""
+        """(z − sgn v_j)(1 − r |v_j|), (T, 1, 1)."""
         j = self.joints[0]
+        v = signals.v[:, j]
         state = _Path.of(signals, j, self.shape["distance"]).state[::2][-len(signals.q) :]
-        return (state - smooth_sign(signals.v[:, j]))[:, None, None]
+        sign = smooth_sign(v)
+        return ((state - sign) * (1.0 - self._damping * sign * v))[:, None, None]
+
+    @property
+    def _damping(self) -> float:
+        """r [s/rad]; declared without one, none."""
+        return self.shape.get("damping", 0.0)
 
     def in_c(self, values: Array, columns: Sequence[str]) -> str:
-        """f (z − sgn v_j)."""
+        """f (z − sgn v_j)(1 − r |v_j|)."""
         j = self.joints[0]
         shape = (self.shape["distance"], _SLIDING, max(WIDTH, _STANDING))
         state = f"dahl(memory, {j}, {', '.join(map(real, shape))})"
-        return f"tau[{j}] += {real(values[0])} * ({state} - s[{j}]);"
+        left = f" * (R(1.0) - {real(self._damping)} * s[{j}] * v[{j}])" if self._damping else ""
+        return f"tau[{j}] += {real(values[0])} * ({state} - s[{j}]){left};"
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """The recursion backwards, λ_k = weight_k + ∂z_{k+1}/∂z_k λ_{k+1}, and the sign's slope.
@@ -106,9 +150,13 @@ class DahlFriction(Effect):
         """
         signals = replace(signals, before=None)
         j = self.joints[0]
+        v, w = signals.v[:, j], weights[:, 0, 0]
         path = _Path.of(signals, j, self.shape["distance"])
-        by_q, by_v = path.pull_back(weights[:, 0, 0])
-        by_v -= weights[:, 0, 0] * smooth_sign_slope(signals.v[:, j])
+        sign, slope = smooth_sign(v), smooth_sign_slope(v)
+        left = 1.0 - self._damping * sign * v
+        by_q, by_v = path.pull_back(w * left)
+        change = (path.state[::2] - sign) * self._damping * (slope * v + sign)
+        by_v -= w * (slope * left + change)
         return Cotangents(q=signals.only(j, by_q), v=signals.only(j, by_v))
 
     def abscissa(self, signals: Signals) -> Abscissa:
@@ -123,10 +171,16 @@ class DahlFriction(Effect):
         return Abscissa("way since the last reversal", "rad", np.clip(way, -most, most))
 
     def report(self, values: Array, covariance: Array) -> dict[str, Value]:
-        """Also `stiffness` σ = f/d, of the joint that has just been turned round."""
+        """Also `stiffness` σ₀ = f/d, of the joint that has just been turned round.
+
+        And `bristle_damping` σ₁ = f r, where it has one.
+        """
         found = super().report(values, covariance)
         friction, distance = found["friction"], self.shape["distance"]
         found["stiffness"] = Value(friction.value / distance, friction.std / distance, "N·m/rad")
+        if self._damping:
+            damping = self._damping * friction.value, self._damping * friction.std
+            found["bristle_damping"] = Value(*damping, "N·m·s/rad")
         return found
 
     def build_into(
@@ -134,7 +188,8 @@ class DahlFriction(Effect):
     ) -> None:
         """A bristle at the joint in place of as much dry friction, which must be there."""
         for j in self.joints:
-            robot.remember(j, _Bristle(float(values[0]), self.shape["distance"]))
+            bristle = _Bristle(float(values[0]), self.shape["distance"], self._damping)
+            robot.remember(j, bristle)
             robot.add_to_joint(j, {"frictionloss": -float(values[0])})
         robot.tell_controller(self, values)
 
@@ -229,10 +284,10 @@ def _recursion(factors: Array, terms: Array) -> Array:
 
 
 class _Bristle:
-    """f z of one joint of a simulated robot."""
+    """f (z + r (s − z) |v|) of one joint of a simulated robot, r its damping."""
 
-    def __init__(self, friction: float, distance: float) -> None:
-        self._friction, self._distance = friction, distance
+    def __init__(self, friction: float, distance: float, damping: float = 0.0) -> None:
+        self._friction, self._distance, self._damping = friction, distance, damping
         self._q = self._z = 0.0
 
     def begin(self, q: float, v: float) -> None:
@@ -242,7 +297,7 @@ class _Bristle:
     def torque(self, q: float, v: float) -> float:
         """At the joint's next position."""
         length = q - self._q
-        side = 1.0 if length > 0.0 else -1.0
+        side = 1.0 if (length or v) > 0.0 else -1.0
         self._z = side + (self._z - side) * float(np.exp(-abs(length) / self._distance))
         self._q = q
-        return self._friction * self._z
+        return self._friction * (self._z + self._damping * (side - self._z) * abs(v))

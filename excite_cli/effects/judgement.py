@@ -97,6 +97,7 @@ class Judgement:
 
     kind: ClassVar[str]
     parameters: ClassVar[tuple[Parameter, ...]]
+    shapes: ClassVar[tuple[Parameter, ...]] = ()
     joints: tuple[int, ...]
     shape: Mapping[str, float]
     runs: tuple[str, ...]
@@ -242,6 +243,17 @@ class Judgement:
         A grid names an effect, it does not measure it. Empty: the grid is all there is.
         """
         return steps_by_ratio(self.shape[name], _FINER)
+
+    def shapes_near(self, signals: Sequence[Signals]) -> list[dict]:
+        """Shapes that may be better once the effect is found: by `finer_steps`, one at a time."""
+        known = {parameter.name: parameter for parameter in self.shapes}
+        return [
+            {**self.shape, name: near}
+            for name, value in self.shape.items()
+            for change in self.finer_steps(name, signals)
+            for near in (float(value - change), float(value + change))
+            if known[name].allows(near)
+        ]
 
     def compares_with(self, other: Effect) -> bool:
         """Whether sizes in the shape of `other` say how uncertain its own are."""

@@ -165,10 +165,26 @@ def signals() -> list[Signals]:
 def test_shapes_are_refined_as_finely_as_they_are_seen(
     kind: str, name: str, value: float, steps: Sequence[float] | None
 ) -> None:
-    found = [each[name] for each in shapes_around(effect(kind, **{name: value}), signals())]
+    every = shapes_around(effect(kind, **{name: value}), signals())
+    found = [each[name] for each in every if {*each} == {name}]  # one at a time
     few = {"power": [0.5, 3.0], "direction": [-1.0]}
     expected = [value + sign * step for step in steps or () for sign in (-1, 1)] or few[name]
     assert found == pytest.approx([value, *expected])
+
+
+def test_a_bristle_gets_a_damping_and_a_longer_distance_at_once_and_loses_it_again() -> None:
+    """Fitted without one, a damped bristle's distance is too short."""
+    swinging = signals()
+    kind = catalogue()["dahl_friction"]
+    every = shapes_around(effect("dahl_friction", distance=0.01), swinging)
+    damped = [each for each in every if each.get("damping")]
+    assert {round(each["distance"], 6) for each in damped} == {0.01, 0.02, 0.04}
+    reversing = np.sqrt(2 * 0.01 * np.sqrt(np.mean(swinging[0].a[:, 0] ** 2)))
+    assert max(each["damping"] for each in damped) == pytest.approx(1 / reversing)
+    again = shapes_around(kind((0,), {"distance": 0.01, "damping": 3.0}), swinging)
+    assert {"distance": 0.01, "damping": 0.0} in again
+    assert {"distance": 0.02, "damping": 1.5} in again
+    assert all(each["damping"] >= 0.0 for each in again)
 
 
 def test_ripple_is_refined_by_parts_of_a_cycle_and_a_touch_by_parts_of_its_length() -> None:

@@ -57,6 +57,18 @@ def test_dahl_friction_is_named_with_its_size_and_distance() -> None:
     assert found.after.mean_relative_moving < 0.3 * found.before.mean_relative_moving
 
 
+def test_a_damped_bristle_is_found_with_its_damping() -> None:
+    """LuGre's friction; without the damping Dahl's leaves several times as much."""
+    dry = planted("coulomb_friction", ELBOW, 5.0)
+    found = diagnosed(dry, planted("dahl_friction", ELBOW, 5.0, distance=0.02, damping=1.5))
+    assert names(found) == [("dahl_friction", "elbow")]
+    (named,) = found.effects
+    assert named.effect.shape["distance"] == pytest.approx(0.02, rel=0.1)
+    assert named.effect.shape["damping"] == pytest.approx(1.5, rel=0.1)
+    friction = named.parameters["friction"]
+    assert friction.value == pytest.approx(5.0, abs=0.3)
+
+
 GEAR = (
     "viscous_friction,coulomb_friction,load_dependent_friction,gear_loss,torque_gain,torque_offset,"
     "stribeck_friction,position_friction,dahl_friction,spring"

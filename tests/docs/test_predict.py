@@ -52,6 +52,7 @@ PLANTED: Sequence[tuple[str, tuple[int, ...], Mapping[str, float], Sequence[floa
     ("gear_loss", (WRIST_1,), {}, [0.2, 0.1]),
     ("position_friction", (WRIST_1,), {"periods": 2.0, "power": 1.0}, [1.5, 1.0]),
     ("dahl_friction", (WRIST_2,), {"distance": 0.05}, [2.0]),
+    ("dahl_friction", (LIFT,), {"distance": 0.04, "damping": 0.8}, [4.0]),
     ("friction_drift", (PAN,), {}, [-0.8, 0.6]),
     ("friction_change", (ELBOW,), {"time_constant": 150.0, "span": 300.0}, [-6.0, 3.0]),
     ("covariate_friction", (LIFT,), {"reference": 30.0, "curvature": 0.02}, [2.0, -1.0]),

@@ -26,6 +26,16 @@ def swinging(step: float, seconds: float = 6.0) -> Signals:
     return along(t, q, 0.76 * np.cos(1.9 * t) + 0.53 * np.cos(5.3 * t))
 
 
+def lugre(q: Array, v: Array, step: float, damping: float) -> Array:
+    """σ₀ y + σ₁ ẏ with ẏ = v − σ₀ |v| y, σ₀ = 1/D and σ₁ = `damping`, in steps that are small."""
+    found, bent = [], D
+    for speed in v:
+        rate = speed - abs(speed) * bent / D
+        found.append(bent / D + damping * rate)
+        bent += step * rate
+    return np.array(found)
+
+
 def state(signals: Signals, distance: float = D) -> Array:
     """z: what it makes of Coulomb friction."""
     effect = DahlFriction((0,), {"distance": distance})
@@ -50,6 +60,22 @@ def test_it_follows_the_differential_equation_however_coarse_the_samples(
     expected = by_steps(fine.q[:, 0], 1.0)
     found = state(swinging(1e-4 * every))
     assert np.abs(found - expected[::every][: len(found)]).max() < error
+
+
+def test_with_a_damping_it_is_the_friction_of_lugre() -> None:
+    fine = swinging(1e-4)
+    expected = lugre(fine.q[:, 0], fine.v[:, 0], 1e-4, 1.5)
+    coarse = swinging(0.02)
+    effect = DahlFriction((0,), {"distance": D, "damping": 1.5})
+    coulomb = kind_named("coulomb_friction")((0,)).columns(coarse)
+    found = (effect.columns(coarse) + coulomb)[:, 0, 0]
+    assert np.abs(found - expected[::200][: len(found)]).max() < 6e-3
+    assert np.abs(state(coarse) - expected[::200][: len(found)]).max() > 0.3
+    reported = effect.report(np.array([4.0]), np.array([[0.01]]))["bristle_damping"]
+    assert (reported.value, reported.std) == pytest.approx((6.0, 0.15))
+    assert "bristle_damping" not in DahlFriction((0,), {"distance": D}).report(
+        np.array([4.0]), np.array([[0.01]])
+    )
 
 
 def test_after_a_reversal_it_builds_up_over_the_distance() -> None:
@@ -84,10 +110,11 @@ def test_distances_follow_the_travelled_range() -> None:
     assert [s["distance"] for s in DahlFriction.grid(ROBOT, (0,), [still])] == [5e-4]
 
 
-def test_pull_back_goes_through_turning_points() -> None:
+@pytest.mark.parametrize("damping", [0.0, 2.0])
+def test_pull_back_goes_through_turning_points(damping: float) -> None:
     """With the narrow sign of measured data, on steps that are long against it."""
     signals = swinging(0.1)
-    effect = DahlFriction((0,), {"distance": D})
+    effect = DahlFriction((0,), {"distance": D, "damping": damping})
     weights = np.random.default_rng(2).normal(size=(len(signals.t), 1, 1))
 
     def value(x: Array) -> float:
@@ -108,6 +135,13 @@ def test_the_simulated_bristle_is_the_column() -> None:
     bristle.begin(signals.q[0, 0], signals.v[0, 0])
     torque = [bristle.torque(q, v) for q, v in zip(signals.q[:, 0], signals.v[:, 0], strict=True)]
     assert np.array(torque) == pytest.approx(3.0 * state(signals), abs=6e-3)
+    damped = _Bristle(3.0, D, 2.0)
+    damped.begin(signals.q[0, 0], signals.v[0, 0])
+    torque = [damped.torque(q, v) for q, v in zip(signals.q[:, 0], signals.v[:, 0], strict=True)]
+    effect = DahlFriction((0,), {"distance": D, "damping": 2.0})
+    coulomb = kind_named("coulomb_friction")((0,)).columns(signals)
+    expected = 3.0 * (effect.columns(signals) + coulomb)[:, 0, 0]
+    assert np.array(torque) == pytest.approx(expected, abs=0.02)
 
 
 def test_what_was_before_a_record_counts_until_it_is_forgotten() -> None:

@@ -25,7 +25,10 @@ ROBOTS = [
 
 
 # Shapes that no search tries.
-DECLARED = {"stribeck_friction": [{"stribeck_speed": 0.4, "load_power": 1.0}]}
+DECLARED = {
+    "stribeck_friction": [{"stribeck_speed": 0.4, "load_power": 1.0}],
+    "dahl_friction": [{"distance": 0.05, "damping": 3.0}],
+}
 
 
 def _effects(kind: type[Effect], robot: Robot, signals: Signals) -> list[Effect]:
