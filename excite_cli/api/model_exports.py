@@ -19,7 +19,7 @@ from excite_cli.export.actuator_configs import joint_values
 from excite_cli.export.c_model import c_model
 from excite_cli.export.drive import Drive, drive_of
 from excite_cli.export.exported import OF_DRIVES, ModelText, in_words, with_straight_friction
-from excite_cli.export.held_out import HeldOutErrors, held_out_errors
+from excite_cli.export.held_out import HeldOutErrors, held_out_errors, torque_left
 from excite_cli.export.parameters import parameters_yaml
 from excite_cli.export.randomization import quantities, randomization
 from excite_cli.given_files import refuse_inputs_as_outputs
@@ -143,7 +143,8 @@ def _randomization(stored: StoredModel, wanted: ModelRequest) -> ModelText:
     notes = ["samples are drawn among robots that can be: no link is moved to the border for it"]
     if stored.model.of_single_runs:
         notes.append("effects of single recordings are not in it")
-    return ModelText(randomization(y, found, count, seed, delay), tuple(notes))
+    left = torque_left(robot, stored.traces, simplify(found.model), mjcf.holds)
+    return ModelText(randomization(y, found, count, seed, delay, left), tuple(notes))
 
 
 def uncertain_model(stored: StoredModel) -> UncertainModel:

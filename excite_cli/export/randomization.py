@@ -120,9 +120,17 @@ def covariance_of(y: Quantities, uncertain: UncertainModel) -> Array:
 
 
 def randomization(
-    y: Quantities, uncertain: UncertainModel, count: int, seed: int, delay: float | None
+    y: Quantities,
+    uncertain: UncertainModel,
+    count: int,
+    seed: int,
+    delay: float | None,
+    torque_left: Array,
 ) -> str:
-    """JSON text: names, units, mean, covariance, and `count` samples; `delay` of commands [s]."""
+    """JSON text: names, units, mean, covariance, and `count` samples; `delay` of commands [s].
+
+    `torque_left` (n,): RMS of the held-out torque that the mean leaves, NaN where not known.
+    """
     drawn = [y.of(uncertain.at(x)) for x in uncertain.drawn(count, seed)]
     covariance = covariance_of(y, uncertain)
     links = {
@@ -136,6 +144,10 @@ def randomization(
         "links": links,
         "delay": delay,
         "seed": seed,
+        "torque_left": {
+            name: float(f"{rms:.4g}") if np.isfinite(rms) else None
+            for name, rms in zip(y.robot.joint_names, torque_left, strict=True)
+        },
         "names": list(y.names),
         "units": list(y.units),
         "mean": _rounded(y.of(uncertain.model)),

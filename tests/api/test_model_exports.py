@@ -125,6 +125,8 @@ def test_a_diagnosis_has_them_as_well(loop: Loop, tmp_path: Path) -> None:
     assert found["mean"][at] == pytest.approx(2.0, abs=0.3)
     assert 0.0 < found["std"][at] < 0.3
     assert np.abs(friction - 2.0).max() < 0.5
+    assert set(found["torque_left"]) == {"elbow", "slide"}
+    assert all(0.0 < rms < 0.5 for rms in found["torque_left"].values())
 
 
 def test_what_has_no_covariance_is_refused(tmp_path: Path) -> None:

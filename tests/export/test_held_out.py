@@ -12,7 +12,7 @@ from excite_cli.effects.armature import Armature
 from excite_cli.effects.catalogue import straight_friction
 from excite_cli.effects.torque_offset import TorqueOffset
 from excite_cli.export import mjcf, urdf
-from excite_cli.export.held_out import HeldOutErrors, held_out_errors
+from excite_cli.export.held_out import HeldOutErrors, held_out_errors, torque_left
 from excite_cli.identification.identified_model import IdentifiedModel, as_described
 from excite_cli.identification.regression import Series
 from excite_cli.identification.torque_trace import TorqueTrace
@@ -59,6 +59,9 @@ def test_shares_are_by_their_definition(robot: Robot) -> None:
     assert of_mjcf.described == pytest.approx(before)
     without = true.without((effects[2],))
     assert of_urdf.file == pytest.approx(share(without.predicted(robot, motion).torque))
+    lacking = trace.measured - without.predicted(robot, motion).torque
+    left = torque_left(robot, both, true, urdf.holds)
+    assert left == pytest.approx(np.sqrt(np.mean(lacking**2, axis=0)))
     assert not of_mjcf.worse
     assert replace(of_mjcf, file=before).worse
     assert not replace(of_mjcf, file=9.0, described=None).worse
@@ -72,6 +75,8 @@ def test_without_held_out_samples_nothing_is_said(robot: Robot) -> None:
     few = trace_of(robot, described)
     few = replace(few, counted=few.counted & (np.arange(200) < 5)[:, None])
     assert held_out_errors(robot, [few], described, mjcf.holds, described) is None
+    for known in ([trained], [few]):
+        assert np.isnan(torque_left(robot, known, described, mjcf.holds)).all()
 
 
 def test_a_file_that_is_worse_is_said_first() -> None:
