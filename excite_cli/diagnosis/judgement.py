@@ -120,7 +120,8 @@ class Judgement:
         key = (max(dof, 1), c.tests)
         if key not in self._thresholds:
             self._thresholds[key] = float(chi2.isf(self.rules.significance / c.tests, key[0]))
-        prior_cost = c.effect.prior_cost + rules.ON_FEWER_ROWS * (candidate in self._on_fewer_rows)
+        prior_cost = c.effect.prior_cost + c.effect.shape_cost
+        prior_cost += rules.ON_FEWER_ROWS * (candidate in self._on_fewer_rows)
         return self.rules.inflation * self._thresholds[key] + prior_cost
 
     @cached_property

@@ -37,6 +37,11 @@ class EffectRecord:
     link: str = ""
     covariate: str = ""
 
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What effects that differ in shape and values only have in common."""
+        return self.kind, self.joints, self.runs, self.covariate
+
 
 @dataclass(frozen=True)
 class Approximation:
@@ -243,6 +248,18 @@ class Information:
     rivals: tuple[EffectRecord, ...]
     noise: Annotated[Array, shape("n", finite=True)]
     possible: tuple[EffectRecord, ...] = ()
+
+    def columns_of(self, effects: Sequence[EffectRecord]) -> list[int] | None:
+        """Of the base parameters, then of `effects` in their order; None if it lacks one."""
+        at: dict[tuple[object, ...], range] = {}
+        start = self.rank
+        for record in (*self.model, *self.rivals, *self.possible):
+            end = start + len(record.values)
+            at.setdefault(record.key, range(start, end))
+            start = end
+        if start > self.factor.shape[1] or not all(each.key in at for each in effects):
+            return None
+        return [*range(self.rank), *(k for each in effects for k in at[each.key])]
 
 
 OPEN_SETUP = "open_setup"  # the kind of a finding: the set-up is in doubt

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from excite_cli.diagnosis.candidates import effect_of
-from excite_cli.diagnosis.records import Diagnosis, EffectRecord
+from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
 from excite_cli.dynamics.pseudo_inertia import body_lengths, inertial_prior
 from excite_cli.dynamics.regressor import standard_parameters
@@ -118,10 +118,10 @@ def reduced_model(
 def _require_own(found: Diagnosis, rank: int, where: object) -> None:
     """Raise FileError unless the information is that of the model."""
     information = found.information
-    told = {_key(r) for r in (*found.declared, *(named.effect for named in found.effects))}
+    told = {r.key for r in (*found.declared, *(named.effect for named in found.effects))}
     records = (*information.model, *information.rivals, *information.possible)
     size = rank + sum(len(record.values) for record in records)
-    same = told == {_key(record) for record in information.model}
+    same = told == {record.key for record in information.model}
     if not (same and information.rank == rank and information.factor.shape[1] == size):
         raise FileError(
             f"{where}: its covariance is of other effects than its model. Diagnose again."
@@ -131,22 +131,18 @@ def _require_own(found: Diagnosis, rank: int, where: object) -> None:
 def _columns(found: Diagnosis, robot: Robot, rank: int) -> list[_Column]:
     """All effects of the information, those of the model with the values that are told."""
     told = {
-        _key(record): np.asarray(record.values, dtype=float)
+        record.key: np.asarray(record.values, dtype=float)
         for record in (*found.declared, *(named.effect for named in found.effects))
     }
     information, columns, start = found.information, [], rank
     for record in (*information.model, *information.rivals, *information.possible):
         size = len(record.values)
         chosen = start < rank + sum(len(each.values) for each in information.model)
-        values = told.get(_key(record), np.asarray(record.values, dtype=float))
+        values = told.get(record.key, np.asarray(record.values, dtype=float))
         effect = effect_of(record, robot.joint_names)
         columns.append(_Column(effect, values, range(start, start + size), chosen))
         start += size
     return columns
-
-
-def _key(record: EffectRecord) -> tuple[object, ...]:
-    return record.kind, record.joints, record.runs, record.covariate
 
 
 def _joining(columns: list[_Column], kept: list[_Column], whole: list[_Column]) -> list[_Column]:

@@ -53,6 +53,7 @@ _DISTANCES = 5e-4, 0.5  # rad
 # distance after a reversal, and distances with each: one without damping is too short for it by up
 # to five, and no step of one of them alone leads out of that.
 _DAMPINGS = 0.25, 0.5, 1.0
+_OF_DAMPING = 4.0  # χ²
 _LONGER = 1.0, 2.0, 4.0
 _RATIOS = 0.5, 0.8, 1.25, 2.0
 _SHARES = np.geomspace(1e-3, 0.25, 7)  # of the range; neighbours overlap by 0.9
@@ -82,6 +83,11 @@ class DahlFriction(Effect):
     defaults: ClassVar = {"distance": 0.03, "damping": 0.0}
     prior_cost: ClassVar = 2.0
     refines: ClassVar = ("coulomb_friction",)
+
+    @property
+    def shape_cost(self) -> float:
+        """A damping is one more parameter."""
+        return _OF_DAMPING if self._damping else 0.0
 
     @classmethod
     def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:

@@ -131,6 +131,11 @@ class Judgement:
     size: ClassVar[tuple[str, ...]] = ()
 
     @property
+    def shape_cost(self) -> float:
+        """χ² beyond `prior_cost`, of parameters that not all of its shapes have."""
+        return 0.0
+
+    @property
     def is_change(self) -> bool:
         """Whether it is by how much something that all runs have is more, or less, in some."""
         return self.changes_between_runs and bool(self.runs)

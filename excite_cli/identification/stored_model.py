@@ -12,7 +12,7 @@ from excite_cli.identification.processing import Processing
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.measurement.campaign_clock import Recorded
 from excite_cli.measurement.dataset import Finding
-from excite_cli.robot.model import Robot
+from excite_cli.robot.model import Array, Robot
 from excite_cli.shown.answer import Shown
 
 # What a fit file holds, as a frozen record.
@@ -51,7 +51,8 @@ class StoredModel:
     `what` it is: "fit", "diagnosis", "config", or "urdf" for a config without numbers. `error` on
     `held_out_run`, which no fit saw; `noise` of the filtered torque by joint, where known;
     `processing`: the filters of both. `traces`: torque over time of training and held-out data.
-    `consistent`: the same of bodies that can be, where a fit has them.
+    `consistent`: the same of bodies that can be, where a fit has them. `factor` R (r + k, r + k):
+    RᵀR is the information of the r base parameters and of the effects' k, in their order.
     """
 
     path: Path
@@ -66,4 +67,5 @@ class StoredModel:
     processing: Processing | None = None
     traces: tuple[TorqueTrace, ...] = ()
     consistent: IdentifiedModel | None = None
+    factor: Array | None = None
     sources: tuple[str, ...] = ()

@@ -51,7 +51,7 @@ class Thresholds(Shown):
 
     def at(self, speed: Array, load: Array) -> Array:
         """Thresholds (T, n) [N·m] (N) of the filtered residual."""
-        return self.level * np.sqrt(_squares(self.coefficients, speed, load))
+        return self.level * np.sqrt(squares_of(self.coefficients, speed, load))
 
     def filtered(self, residual: Array, step: float) -> Array:
         """The residual (T, n) behind the low pass."""
@@ -103,15 +103,10 @@ def thresholds_of(
         square = np.concatenate([np.square(x[:, j]) for x in smooth])
         speed = np.concatenate([run.speed[:, j] for run in runs])
         load = np.concatenate([run.load[:, j] for run in runs])
-        columns = _columns(speed, load)
-        mean = float(square.mean())
-        size = np.maximum(columns.mean(axis=0), 1e-300)
-        found, _ = nnls(columns / size, square / max(mean, 1e-300))
-        coefficients[j] = found / size * mean
-        coefficients[j, 0] = max(coefficients[j, 0], _LEAST * mean)
+        coefficients[j] = speed_and_load_squares(square, speed, load)
     maxima = []
     for run, x in zip(runs, smooth, strict=True):
-        ratio = np.abs(x) / np.sqrt(_squares(coefficients, run.speed, run.load))
+        ratio = np.abs(x) / np.sqrt(squares_of(coefficients, run.speed, run.load))
         length = max(1, round(1.0 / run.step))
         whole = len(ratio) // length * length
         if whole:
@@ -133,10 +128,26 @@ def low_pass(x: Array, step: float, time_constant: float) -> Array:
     return np.asarray(lfilter([share], [1.0, share - 1.0], x, axis=0, zi=begin)[0])
 
 
-def _columns(speed: Array, load: Array) -> Array:
-    reversal = np.exp(-np.square(speed / REVERSAL))
+def speed_and_load_squares(
+    squares: Array, speed: Array, load: Array, width: float = REVERSAL
+) -> Array:
+    """c₀ … c₃ (4,) of s² by least squares of residuals' `squares` (m,), as above; w is `width`."""
+    columns = _columns(speed, load, width)
+    mean = float(squares.mean())
+    size = np.maximum(columns.mean(axis=0), 1e-300)
+    found, _ = nnls(columns / size, squares / max(mean, 1e-300))
+    coefficients = np.asarray(found / size * mean)
+    coefficients[0] = max(coefficients[0], _LEAST * mean)
+    return coefficients
+
+
+def squares_of(
+    coefficients: Array, speed: Array, load: Array, width: float | Array = REVERSAL
+) -> Array:
+    """s² (T, n) of coefficients (n, 4), speeds and loads (T, n); w is `width` (n,)."""
+    return np.einsum("tjc,jc->tj", _columns(speed, load, width), coefficients)
+
+
+def _columns(speed: Array, load: Array, width: float | Array) -> Array:
+    reversal = np.exp(-np.square(speed / width))
     return np.stack([np.ones_like(speed), speed**2, load**2, reversal], axis=-1)
-
-
-def _squares(coefficients: Array, speed: Array, load: Array) -> Array:
-    return np.einsum("tjc,jc->tj", _columns(speed, load), coefficients)

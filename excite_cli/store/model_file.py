@@ -10,7 +10,7 @@ import numpy as np
 from excite_cli.config.load_spec import load_spec, parse_spec
 from excite_cli.config.spec import IdentifiedSpec, Spec
 from excite_cli.diagnosis.candidates import effect_of
-from excite_cli.diagnosis.records import EffectRecord
+from excite_cli.diagnosis.records import Diagnosis, EffectRecord
 from excite_cli.diagnosis.reduced_model import reduced_model
 from excite_cli.dynamics.regressor import standard_parameter_names
 from excite_cli.effects.base import Effect
@@ -18,10 +18,11 @@ from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import ConfigError, FileError
 from excite_cli.given_files import require_stored
 from excite_cli.identification.errors_of_torque import Errors
+from excite_cli.identification.factors import triangle_of
 from excite_cli.identification.identified_model import IdentifiedModel, as_described
 from excite_cli.identification.processing import Processing
 from excite_cli.identification.stored_model import StoredModel
-from excite_cli.robot.model import Robot, build_measured_robot
+from excite_cli.robot.model import Array, Robot, build_measured_robot
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis
 from excite_cli.store.fit_file import is_fit, read_fit
 from excite_cli.store.own_file import is_own
@@ -63,7 +64,8 @@ def _of_fit(path: Path) -> StoredModel:
     noise = stored.noise_floor or dict(zip(fit.joint_names, map(float, fit.noise), strict=True))
     return StoredModel(
         path, "fit", spec, folder, robot, fit.model, stored.held_out_run, stored.error, noise,
-        _processing(stored.processing), stored.traces, fit.best_model, stored.sources,
+        _processing(stored.processing), stored.traces, fit.best_model,
+        _information(fit.covariance), stored.sources,
     )  # fmt: skip
 
 
@@ -78,8 +80,26 @@ def _of_diagnosis(path: Path) -> StoredModel:
     return StoredModel(
         path, "diagnosis", spec, folder, robot, _model(found.phi, records, robot, path),
         found.held_out_run, found.after, noise, _processing(found.processing),
-        (*trained, *found.held_out_traces),
+        (*trained, *found.held_out_traces), factor=_own_factor(found),
     )  # fmt: skip
+
+
+def _own_factor(found: Diagnosis) -> Array | None:
+    """Of the model's own columns; None where the information is that of other effects."""
+    order = found.information.columns_of(
+        (*found.declared, *(named.effect for named in found.effects))
+    )
+    return None if order is None else triangle_of(found.information.factor[:, order])
+
+
+def _information(covariance: Array) -> Array:
+    """R (p, p) with RᵀR the inverse of a covariance; zero for what is not known (infinite)."""
+    known = np.isfinite(np.diag(covariance))
+    values, vectors = np.linalg.eigh(covariance[np.ix_(known, known)])
+    rows = vectors.T / np.sqrt(np.maximum(values, 1e-300))[:, None]
+    factor = np.zeros_like(covariance)
+    factor[np.ix_(known, known)] = rows
+    return factor
 
 
 def consistent_model(stored: StoredModel) -> IdentifiedModel:

@@ -1,0 +1,160 @@
+"""Where a model can be trusted: the standard deviation of the torque that it predicts for a state.
+
+What a model left of its own data says it where these data are; outside of them it leaves more. Of
+joint j at speed v and rigid-body torque `load`,
+
+    s² = (c₀ + c₁ v² + c₂ load² + c₃ exp(−(v/w)²)) h g²,
+    g = max(1, |v| / v₉₉, |load| / load₉₉, (d / d₉₅)^½),    d² = xᵀ C x,
+
+with c ≥ 0 by least squares of the squared residuals (as of a collision detector, `thresholds`), w a
+tenth of the joint's RMS speed, and h how many times more is left of held-out data than that says of
+them. Indices are percentages of the own data. d is the standard deviation of the torque by the
+covariance C of the parameters, x their columns: what parameters are off by where the data are is in
+the residual, and counts only beyond that.
+
+The residual holds noise, errors of parameters and effects that the model lacks, so that s is of a
+torque as it will be measured.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import nan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from excite_cli.dynamics.base_parameters import find_base_parameters
+from excite_cli.dynamics.pseudo_inertia import UNSURE, inertial_prior
+from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.rigid_body import RigidBody
+from excite_cli.errors import ConfigError
+from excite_cli.identification.errors_of_torque import FEWEST
+from excite_cli.identification.regression import (
+    Series,
+    effect_columns,
+    signals_of,
+    with_effects,
+)
+from excite_cli.identification.stored_model import StoredModel
+from excite_cli.identification.torque_trace import TorqueTrace
+from excite_cli.identification.uncertain_model import from_information
+from excite_cli.measurement.run_identity import RunId
+from excite_cli.robot.model import Array
+from excite_cli.scoring.thresholds import speed_and_load_squares, squares_of
+
+_REVERSAL = 0.1  # of a joint's RMS speed: below it friction is known least
+_RANGE, _PRECISE = 0.99, 0.95  # quantiles of the own data: beyond them a state is outside
+_LEVERAGE = 0.5  # power of d / d₉₅
+_AT_ONCE = 2000  # states whose columns are in memory
+
+
+@dataclass(frozen=True)
+class Validity:
+    """What a model leaves, by joint (n,): `coefficients` (n, 4), `width` w, `held_out` h.
+
+    `speed`, `load` and `precision`: v₉₉, load₉₉ and d₉₅. NaN of joints without enough samples.
+    """
+
+    coefficients: Array
+    width: Array
+    held_out: Array
+    speed: Array
+    load: Array
+    precision: Array
+
+    def outside(self, v: Array, load: Array, d: Array) -> Array:
+        """Ratios (3, T, n) of speed, load and √d to the own data's: above 1 it is outside."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.stack(
+                [
+                    np.abs(v) / self.speed,
+                    np.abs(load) / self.load,
+                    (d / self.precision) ** _LEVERAGE,
+                ]
+            )
+
+    def deviation(self, v: Array, load: Array, d: Array) -> Array:
+        """s (T, n) [N·m] (N)."""
+        squares = squares_of(self.coefficients, v, load, self.width) * self.held_out
+        farther = np.fmax.reduce([*self.outside(v, load, d), np.ones_like(v)])
+        return np.asarray(np.sqrt(squares) * farther)
+
+
+def validity_of(traces: Sequence[TorqueTrace], deviations: Sequence[Array]) -> Validity:
+    """From the traces of a model's own data, with d (m, n) of each."""
+    n = traces[0].v.shape[1]
+    v, load, d = (
+        np.concatenate(each)
+        for each in ([t.v for t in traces], [t.load for t in traces], deviations)
+    )
+    left = np.concatenate([np.where(t.counted, t.measured - t.predicted, np.nan) for t in traces])
+    apart = np.concatenate([np.full(len(t.t), t.held_out) for t in traces])
+    numbers = [_of_joint(v[:, j], load[:, j], d[:, j], left[:, j], apart) for j in range(n)]
+    coefficients, *others = zip(*numbers, strict=True)
+    return Validity(np.array(coefficients), *(np.array(each) for each in others))
+
+
+def _of_joint(
+    v: Array, load: Array, d: Array, left: Array, apart: NDArray[np.bool_]
+) -> tuple[Array, float, float, float, float, float]:
+    known = np.isfinite(left)
+    if known.sum() < FEWEST:
+        return np.full(4, nan), nan, nan, nan, nan, nan
+    v, load, d, left = (x[known] for x in (v, load, d, left))
+    apart = apart[known]
+    width = _REVERSAL * float(np.sqrt(np.mean(np.square(v))))
+    squares = np.square(left)
+    coefficients = speed_and_load_squares(squares, v, load, width)
+    more = 1.0
+    if min(apart.sum(), (~apart).sum()) >= FEWEST:
+        own = squares_of(coefficients[None], v[apart, None], load[apart, None], np.array([width]))
+        more = max(1.0, float(squares[apart].mean() / own.mean()))
+    fastest, heaviest = (float(np.quantile(np.abs(x), _RANGE)) for x in (v, load))
+    return coefficients, width, more, fastest, heaviest, float(np.quantile(d, _PRECISE))
+
+
+class Trust:
+    """What is known of the torque that a stored model predicts, for any states."""
+
+    def __init__(self, stored: StoredModel) -> None:
+        """ConfigError where the model keeps no residual of its own data."""
+        if not stored.traces:
+            raise ConfigError(
+                f"{stored.path} does not say what it left of its own data. Give the fit (excite "
+                "identify -o) or the diagnosis (excite diagnose -o) itself."
+            )
+        self._robot, self._model = stored.robot, stored.model
+        self._root = _root_of(stored)
+        series = [Series(t.t, t.q, t.v, t.a, RunId(t.run)) for t in stored.traces]
+        self.validity = validity_of(stored.traces, [self.by_parameters(each) for each in series])
+
+    def deviation(self, series: Series, load: Array) -> Array:
+        """s (T, n) [N·m] (N) of the torque, beside the model's `load` (T, n)."""
+        return self.validity.deviation(series.v, load, self.by_parameters(series))
+
+    def by_parameters(self, series: Series) -> Array:
+        """d (T, n) [N·m] (N): of the torque by the covariance of the parameters; 0 if unknown."""
+        if self._root is None:
+            return np.zeros_like(series.q)
+        robot, model = self._robot, self._model
+        signals = signals_of(series, robot, model.phi)
+        signals = with_effects(signals, model.effects, model.values)
+        effects = effect_columns(model.effects, signals)
+        found = np.empty_like(series.q)
+        for start in range(0, len(found), _AT_ONCE):
+            part = slice(start, start + _AT_ONCE)
+            body = RigidBody(robot, model.phi, series.q[part], series.v[part], series.a[part])
+            columns = np.concatenate([body.regressor, effects[part]], axis=2)
+            found[part] = np.sqrt(np.square(columns @ self._root).sum(axis=2))
+        return found
+
+
+def _root_of(stored: StoredModel) -> Array | None:
+    """B (P + k, m) of the covariance B Bᵀ; None where it is not known.
+
+    Nor where effects follow a column of the log, which traces do not keep.
+    """
+    if stored.factor is None or any(effect.covariate for effect in stored.model.effects):
+        return None
+    base, cad = find_base_parameters(stored.robot), standard_parameters(stored.robot)
+    return from_information(base, inertial_prior(stored.robot, cad, UNSURE), stored.factor)
