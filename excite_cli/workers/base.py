@@ -22,6 +22,7 @@ import numpy as np
 
 from excite_cli.errors import ExciteError
 from excite_cli.out_of_core import Spool, attached, reference_to
+from excite_cli.shown.note import readable
 
 # Messages between processes of one machine, in which large arrays are named and not copied.
 #
@@ -92,6 +93,7 @@ class News:
 Watch = Callable[[News], None]
 
 
+@readable
 def unwatched(news: News) -> None:
     """Report to nobody."""
 
