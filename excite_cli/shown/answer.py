@@ -9,7 +9,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from html import escape
+from importlib import import_module
+from types import MappingProxyType
 from typing import Any, Self, TypeVar
+
+from excite_cli.errors import ConfigError, MissingExtraError, nearest
 
 
 class Detail(IntEnum):
@@ -240,10 +244,16 @@ def _text(text: str) -> str:
     return escape(text).replace("\n", "<br>")
 
 
+Told = TypeVar("Told", contravariant=True)
+# Rows of a table by its name, and what its columns are called where it has none.
+Tables = Mapping[str, tuple[tuple[str, ...], Callable[[Told], Iterable[Mapping[str, Any]]]]]
+
+
 @dataclass(frozen=True)
 class _Shown:
     words: Callable[[Any], str]
     parts: Callable[[Any], Parts]
+    tables: Tables[Any]
 
 
 _known: dict[type, _Shown] = {}
@@ -264,13 +274,49 @@ class Shown:
         found = _found(type(self))
         return None if found is None else as_html(found.parts(self))
 
+    def table(self, name: str) -> Any:
+        """A pandas DataFrame of numbers: "effects", "errors" or "parameters".
+
+        A diagnosis and an identification have all three. Values of different kinds stand in one
+        column, and their units in the column `unit`; columns `error…` are shares of the joint's
+        torque (RMS), `share…` and `gain` shares as well.
+
+        Raises
+        ------
+        ConfigError
+            The record has no such table.
+        MissingExtraError
+            pandas is not installed.
+        """
+        found = _found(type(self))
+        tables = {} if found is None else found.tables
+        if name not in tables:
+            own = f"Tables: {', '.join(tables)}." if tables else "It has none."
+            raise ConfigError(
+                f"{type(self).__name__} has no table '{name}'. {own}{nearest(str(name), tables)}"
+            )
+        try:
+            pandas = import_module("pandas")
+        except ImportError as error:
+            raise MissingExtraError(
+                "Tables need pandas, which is not installed. Run: pip install 'excite-cli[tables]'"
+            ) from error
+        columns, rows = tables[name]
+        told = list(rows(self))
+        return pandas.DataFrame(told, columns=[*(told[0] if told else columns)])
+
 
 T = TypeVar("T", bound=Shown)
 
 
-def show(kind: type[T], words: Callable[[T], str], parts: Callable[[T], Parts]) -> None:
-    """State how records of `kind` are shown: in words (inside brackets), and as tables."""
-    _known[kind] = _Shown(words, parts)
+def show(
+    kind: type[T],
+    words: Callable[[T], str],
+    parts: Callable[[T], Parts],
+    tables: Tables[T] = MappingProxyType({}),
+) -> None:
+    """State how records of `kind` are shown: in words (inside brackets), as tables, as numbers."""
+    _known[kind] = _Shown(words, parts, tables)
 
 
 def _found(kind: type) -> _Shown | None:

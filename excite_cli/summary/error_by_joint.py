@@ -73,14 +73,16 @@ def error_tables(found: Diagnosis, detail: Detail) -> list[Table]:
 
 def _moving(found: Diagnosis) -> Table:
     rows = []
-    for joint, unit in _joints(found):
+    for joint, unit in measured_joints(found):
         row = _row(found, joint, unit, moving=True)
         if found.noise_floor is not None:
             row["noise floor"] = figure(found.noise_floor.get(joint, nan))
         if _has_parts(found):
             row[_OFF] = _taken_off(found, joint)
         rows.append(row)
-    errors = {name: percent(each.mean_relative_moving) for name, each in _errors(found).items()}
+    errors = {
+        name: percent(each.mean_relative_moving) for name, each in errors_by_model(found).items()
+    }
     title = (
         f"Error of the torque on held-out data ({found.held_out_run}), where joints move "
         f"({_columns_in_words(found)})"
@@ -99,7 +101,7 @@ def _with_mean(
 def _row(found: Diagnosis, joint: str, unit: str, moving: bool) -> dict[str, str]:
     errors = {
         name: percent((each.relative_moving if moving else each.relative)[joint])
-        for name, each in _errors(found).items()
+        for name, each in errors_by_model(found).items()
     }
     before, after = ((_rms(each) if moving else each.rms) for each in (found.before, found.after))
     rms = {"RMS declared": figure(before[joint]), "RMS with effects": figure(after[joint])}
@@ -115,7 +117,7 @@ def _columns_in_words(found: Diagnosis) -> str:
     return f"{given}declared model and textbook friction, both refitted"
 
 
-def _errors(found: Diagnosis) -> dict[str, Errors]:
+def errors_by_model(found: Diagnosis) -> dict[str, Errors]:
     """By heads of columns."""
     known = {
         "URDF": found.untouched,
@@ -126,7 +128,7 @@ def _errors(found: Diagnosis) -> dict[str, Errors]:
     return {head: each for head, each in known.items() if each is not None}
 
 
-def _joints(found: Diagnosis) -> Iterator[tuple[str, str]]:
+def measured_joints(found: Diagnosis) -> Iterator[tuple[str, str]]:
     """Those whose torque was measured, with its unit."""
     every = zip(found.joint_names, found.torque_units, strict=True)
     return ((joint, unit) for joint, unit in every if not isnan(found.after.rms[joint]))
@@ -177,7 +179,7 @@ def _taken_off(found: Diagnosis, joint: str) -> str:
 
 def _parts(found: Diagnosis) -> Table:
     """Every joint's way from the first error to the last, by all that takes a part off."""
-    begin, unit = found.baseline, dict(_joints(found))
+    begin, unit = found.baseline, dict(measured_joints(found))
     rows: list[tuple[str, ...]] = []
     parted: list[int] = []
     for joint in found.joint_names:
@@ -211,10 +213,10 @@ def _parts(found: Diagnosis) -> Table:
 
 
 def _all_samples(found: Diagnosis) -> Table:
-    rows = [_row(found, joint, unit, moving=False) for joint, unit in _joints(found)]
+    rows = [_row(found, joint, unit, moving=False) for joint, unit in measured_joints(found)]
     title = (
         f"Over all samples of {found.held_out_run}, including joints at rest (unfiltered: with "
         "effects, the torque as recorded)"
     )
-    errors = {name: percent(each.mean_relative) for name, each in _errors(found).items()}
+    errors = {name: percent(each.mean_relative) for name, each in errors_by_model(found).items()}
     return _with_mean(title, rows, errors, folded=True)

@@ -43,6 +43,7 @@ from excite_cli.summary.cells import (
     percent,
 )
 from excite_cli.summary.findings import data_blocks
+from excite_cli.summary.frames import OF_FIT, OF_IDENTIFICATION
 
 _CORRELATED, _MOST_PAIRS = 0.95, 15
 
@@ -367,9 +368,9 @@ def correlated_parameters(fit: Fit) -> tuple[Block, ...]:
     )
 
 
-show(Fit, _fit_in_words, lambda fit: [_parameter_table(fit)])
-show(Identification, _in_words, identification_parts)
-show(StoredFit, _in_words, _stored_parts)
+show(Fit, _fit_in_words, lambda fit: [_parameter_table(fit)], OF_FIT)
+show(Identification, _in_words, identification_parts, OF_IDENTIFICATION)
+show(StoredFit, _in_words, _stored_parts, OF_IDENTIFICATION)
 
 
 # What the robot carries, as a table and as data.
