@@ -18,7 +18,7 @@ from excite_cli.measurement.campaign_clock import Recorded
 from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.model import Array
 from excite_cli.robot.tree import Skeleton
-from excite_cli.shown.answer import Shown
+from excite_cli.shown.answer import Shown, drawn
 
 
 @dataclass(frozen=True)
@@ -305,6 +305,34 @@ class Diagnosis(Shown):
     trained: Errors | None = None
     skeleton: Skeleton | None = None
     recorded: Recorded = field(default_factory=Recorded)
+
+    def plot_residual(self, joint: str | None = None, ax: Any = None) -> Any:
+        """Torque of the held-out run in time, and what both models leave of it [N·m] (N).
+
+        A row per joint, or the one that is named; measured torque and the declared model's residual
+        are dots, the model with effects is a line. In `ax` (matplotlib) of yours one joint's
+        residual alone. The axes are returned.
+
+        Raises
+        ------
+        ConfigError, MissingExtraError
+            There is no such joint; matplotlib is not installed.
+        """
+        return drawn(self, "plot_residual", joint, ax)
+
+    def plot_friction(self, joint: str, ax: Any = None) -> Any:
+        """Friction that was found on a joint over its speed: measured (dots), and the law.
+
+        Measured is the torque of the training data [N·m] (N) less all other terms of the model; the
+        band holds the middle 80 %. Drawn in `ax` (matplotlib) if that is given. The axes are
+        returned.
+
+        Raises
+        ------
+        ConfigError, MissingExtraError
+            No friction was found on this joint; matplotlib is not installed.
+        """
+        return drawn(self, "plot_friction", joint, ax)
 
     @property
     def torque_units(self) -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """The record of a whole run: what was asked, what was found, and on what."""
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import RandomBaseline, RandomMotion
 from excite_cli.excitation.sequence import FinishedMotion
 from excite_cli.robot.model import Array
-from excite_cli.shown.answer import Shown
+from excite_cli.shown.answer import Shown, drawn
 
 
 @dataclass(frozen=True, repr=False)
@@ -41,6 +42,19 @@ class Result(Shown):
     versions: dict[str, str] = field(default_factory=dict)
     checked_pairs: tuple[str, ...] = ()
     dropped_pairs: tuple[str, ...] = ()
+
+    def plot(self, motion: int | None = None, ax: Any = None) -> Any:
+        """Positions, speeds and accelerations of all joints in time [rad, m, s], of one motion.
+
+        By default the last one; in `ax` (matplotlib) of yours positions alone. The axes are
+        returned.
+
+        Raises
+        ------
+        ConfigError, RobotError, MissingExtraError
+            There is no such motion; the URDF is gone; matplotlib is not installed.
+        """
+        return drawn(self, "plot", motion, ax)
 
     @property
     def effect_names(self) -> tuple[str, ...]:

@@ -254,6 +254,7 @@ class _Shown:
     words: Callable[[Any], str]
     parts: Callable[[Any], Parts]
     tables: Tables[Any]
+    plots: Mapping[str, Callable[..., Any]]
 
 
 _known: dict[type, _Shown] = {}
@@ -314,9 +315,21 @@ def show(
     words: Callable[[T], str],
     parts: Callable[[T], Parts],
     tables: Tables[T] = MappingProxyType({}),
+    **plots: Callable[..., Any],
 ) -> None:
-    """State how records of `kind` are shown: in words (inside brackets), as tables, as numbers."""
-    _known[kind] = _Shown(words, parts, tables)
+    """State how records of `kind` are shown: in words (inside brackets), as tables, as numbers.
+
+    `plots` are what their methods of that name draw.
+    """
+    _known[kind] = _Shown(words, parts, tables, plots)
+
+
+def drawn(record: Shown, name: str, *args: Any) -> Any:
+    """What the plot of this name draws of the record."""
+    found = _found(type(record))
+    if found is None:
+        raise ConfigError(f"{type(record).__name__}: plots are of records that a function gave.")
+    return found.plots[name](record, *args)
 
 
 def _found(kind: type) -> _Shown | None:

@@ -22,6 +22,7 @@ from excite_cli.identification.identify import Identification
 from excite_cli.identification.link_changes import LinkChange
 from excite_cli.identification.stored_model import StoredFit
 from excite_cli.report.error_chart import NOTHING_MOVES, error_charts, parameter_charts
+from excite_cli.report.record_plots import plot_residual
 from excite_cli.report.residual_chart import residuals_in_time
 from excite_cli.shown.answer import (
     Answer,
@@ -369,7 +370,17 @@ def correlated_parameters(fit: Fit) -> tuple[Block, ...]:
 
 
 show(Fit, _fit_in_words, lambda fit: [_parameter_table(fit)], OF_FIT)
-show(Identification, _in_words, identification_parts, OF_IDENTIFICATION)
+show(
+    Identification,
+    _in_words,
+    identification_parts,
+    OF_IDENTIFICATION,
+    plot_residual=lambda found, *of: plot_residual(
+        sorted(found.traces, key=lambda trace: not trace.held_out),
+        dict(zip(found.fit.joint_names, found.torque_units, strict=True)),
+        *of,
+    ),
+)
 show(StoredFit, _in_words, _stored_parts, OF_IDENTIFICATION)
 
 
