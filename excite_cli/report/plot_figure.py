@@ -130,7 +130,7 @@ def save_pages(figures: Iterable["Figure"], path: Path) -> None:
             figure.savefig(file, format="pdf")
 
 
-_COLOURS: dict[Colour, str] = {
+COLOURS: dict[Colour, str] = {
     "ink": "black", "muted": GREY, "blue": BLUE, "vermilion": VERMILION, "green": GREEN,
     "purple": PURPLE,
 }  # fmt: skip
@@ -232,7 +232,7 @@ def _label(axes: "Axes", x: Array, panel: Panel) -> None:
     }
     for (at, y), colour in told.items():
         axes.annotate(f"{y:.3g}", (at, y), xytext=(0, 5), textcoords="offset points", ha="center",
-                      color=_COLOURS[colour], fontsize=8.5)  # fmt: skip
+                      color=COLOURS[colour], fontsize=8.5)  # fmt: skip
 
 
 def _forbidden(
@@ -246,7 +246,7 @@ def _forbidden(
 
 def _draw_series(axes: "Axes", x: Array, series: Curve) -> None:
     there = ~np.isinf(series.y)
-    colour = _COLOURS[series.colour]
+    colour = COLOURS[series.colour]
     axes.plot(x[there], series.y[there], color=colour, label=series.label, **_LOOKS[series.look])
     if series.low is not None and series.high is not None:
         ends = np.stack([series.low, series.high])[:, there & np.isfinite(series.low)]
@@ -270,7 +270,7 @@ def _draw_rows(axes: "Axes", chart: RowsChart) -> None:
     named: dict[str, list[tuple[int, Mark]]] = {}
     for number, row in enumerate(chart.rows):
         for bar in row.bars:
-            axes.hlines(number, bar.low, bar.high, color=_COLOURS[bar.colour], linewidth=1.0)
+            axes.hlines(number, bar.low, bar.high, color=COLOURS[bar.colour], linewidth=1.0)
         for mark in row.marks:
             named.setdefault(mark.word, []).append((number, mark))
     for word, marks in named.items():
@@ -278,7 +278,7 @@ def _draw_rows(axes: "Axes", chart: RowsChart) -> None:
         axes.plot(
             [mark.x for _, mark in marks],
             [number for number, _ in marks],
-            color=_COLOURS[first.colour],
+            color=COLOURS[first.colour],
             label=word,
             linestyle="none",
             clip_on=False,

@@ -17,8 +17,10 @@ from excite_cli.report.effect_chart import Cloud, binned, law_line
 from excite_cli.report.plot import Panel, Plot
 from excite_cli.report.plot_figure import (
     BLUE,
+    COLOURS,
     GREEN,
     GREY,
+    HELD_OUT,
     PURPLE,
     VERMILION,
     WIDTH,
@@ -85,40 +87,36 @@ def plot_residual(
             _panel(each, row, panel, row.title if panel is row.panels[0] else "")
     for each in axes[-1]:
         each.set_xlabel(rows[0].axis)
-    figure.suptitle(f"Run {label}", x=0.01, ha="left")
+    shaded = "; shaded: held out" if rows[0].shaded else ""
+    figure.suptitle(f"{label}{shaded}", x=0.01, ha="left", fontsize=9)
     return axes
 
 
-def _panel(ax: Any, plot: Plot, panel: Panel, title: str) -> None:
-    """The first series as dots behind, the second thin on top; their names in their colours."""
-    first, *others = panel.series
-    drawn = [(first.label, GREY)]
+def _panel(ax: Any, plot: Plot, panel: Panel, title: str = "") -> None:
+    """The first of several series as dots behind, the last thin on top; names in their colours."""
     for low, high in plot.shaded:
-        ax.axvspan(low, high, color="#EAEFF4", linewidth=0)
-    if others:
-        ax.plot(plot.x, first.y, **_DOTS)
-    colour = VERMILION if "residual" in panel.axis else BLUE
-    for series in others or [first]:
-        ax.plot(plot.x, series.y, color=colour, linewidth=0.8)
-        drawn = [*drawn, (series.label, colour)] if others else [(series.label, colour)]
+        ax.axvspan(low, high, color=HELD_OUT, linewidth=0)
+    for series in panel.series:
+        behind = series is not panel.series[-1]
+        look = _DOTS if behind else {"color": COLOURS[series.colour], "linewidth": 0.8}
+        ax.plot(plot.x, series.y, **look)
     ax.set_ylabel(panel.axis)
     ax.margins(x=0.01)
-    words = [(title, "black"), *drawn] if title else drawn
-    _words(ax, words)
+    _words(ax, title, [(series.label, COLOURS[series.colour]) for series in panel.series])
 
 
-def _words(ax: Any, words: Sequence[tuple[str, str]]) -> None:
-    """Words in their colours, side by side above the axes."""
+def _words(ax: Any, title: str, words: Sequence[tuple[str, str]] = ()) -> None:
+    """A title and words in their colours, side by side above the axes."""
     last: Any = None
-    for text, colour in words:
-        place = {"xy": (0, 1), "xycoords": "axes fraction", "xytext": (0, 3)}
+    for text, colour, weight in ((title, "black", "bold"), *((*each, "normal") for each in words)):
+        place: dict[str, Any] = {"xy": (0, 1), "xycoords": "axes fraction", "xytext": (0, 3)}
         if last is not None:
             place = {"xy": (1, 0), "xycoords": last, "xytext": (9, 0)}
-        weight = "bold" if colour == "black" else "normal"
-        last = ax.annotate(
-            text, textcoords="offset points", color=colour, fontsize=8.5, weight=weight,
-            va="bottom", annotation_clip=False, **place,
-        )  # fmt: skip
+        if text:
+            last = ax.annotate(
+                text, textcoords="offset points", color=colour, fontsize=8.5, weight=weight,
+                va="bottom", annotation_clip=False, **place,
+            )  # fmt: skip
 
 
 @styled
@@ -139,7 +137,7 @@ def plot_friction(cloud: Cloud, joint: str, ax: Any) -> Any:
     ax.set_ylim(*(shown + 0.08 * np.ptp(shown) * np.array([-1, 1])))
     ax.set_xlabel(cloud.axis)
     ax.set_ylabel(f"friction {torque_or_force(unit)} [{unit}]")
-    _words(ax, [(joint, "black"), ("measured, less all else", GREY), ("identified law", VERMILION)])
+    _words(ax, joint, [("measured, less all else", GREY), ("identified law", VERMILION)])
     return ax
 
 
@@ -173,7 +171,7 @@ def plot_motion(result: Result, motion: int | None, ax: Any) -> Any:
         each.set_ylabel(f"{word} [{told}]")
         each.margins(x=0.0)
     _at_the_end(axes[0], result.joint_names, states[0])
-    _words(axes[0], [(f"motion {chosen.index}", "black")])
+    _words(axes[0], f"motion {chosen.index}")
     axes[-1].set_xlabel("time [s]")
     return ax if ax is not None else axes
 
