@@ -78,10 +78,9 @@ class Model(Shown):
     def pinocchio(self, tell: Tell = log_note) -> Any:
         """A `pin.Model` with these inertias, what is carried, gravity, and rotors as `armature`.
 
-        `pin.rnea` of it is `torque` but for what `tell` hears of: friction, springs and whatever
-        else Pinocchio's inverse dynamics has no part for. Joints that do not move are locked, as in
-        the config; a floating base is free. Where bodies cannot be, which least squares alone does
-        not rule out, forward dynamics fails: take `consistent`.
+        `pin.rnea` of it is `torque` but for effects that Pinocchio has no part for: `tell` hears of
+        them. A floating base is free. Least squares alone finds bodies that cannot be, for which
+        forward dynamics fails: take `consistent`.
         """
         found, left = pinocchio_model(self.made.robot, self._standing)
         if left:
@@ -92,9 +91,8 @@ class Model(Shown):
     def to_mjmodel(self, tell: Tell = log_note) -> Any:
         """A `mujoco.MjModel`: that of `excite export --format mjcf`, without a file.
 
-        Bodies are those of `consistent`; rotors are `armature`, friction `damping` and
-        `frictionloss`, which MuJoCo's inverse dynamics has as a constraint. What MuJoCo cannot hold
-        is approximated or left out, and `tell` hears of it.
+        Bodies are those of `consistent`; `frictionloss` is a constraint of MuJoCo's, also in its
+        inverse dynamics. What MuJoCo cannot hold is approximated or left out: `tell` hears of it.
 
         Raises
         ------

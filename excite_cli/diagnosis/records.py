@@ -309,9 +309,8 @@ class Diagnosis(Shown):
     def plot_residual(self, joint: str | None = None, ax: Any = None) -> Any:
         """Torque of the held-out run in time, and what both models leave of it [N·m] (N).
 
-        A row per joint, or the one that is named; measured torque and the declared model's residual
-        are dots, the model with effects is a line. In `ax` (matplotlib) of yours one joint's
-        residual alone. The axes are returned.
+        A row per joint; measured torque and the declared model's residual are dots, the model with
+        effects is a line. In `ax` (matplotlib) one joint's residual. Axes are returned.
 
         Raises
         ------
@@ -321,11 +320,9 @@ class Diagnosis(Shown):
         return drawn(self, "plot_residual", joint, ax)
 
     def plot_friction(self, joint: str, ax: Any = None) -> Any:
-        """Friction that was found on a joint over its speed: measured (dots), and the law.
+        """Friction [N·m] (N) that was found on a joint, over its speed: measured, and the law.
 
-        Measured is the torque of the training data [N·m] (N) less all other terms of the model; the
-        band holds the middle 80 %. Drawn in `ax` (matplotlib) if that is given. The axes are
-        returned.
+        Measured (dots): the training data's torque less all else in the model. Axes are returned.
 
         Raises
         ------

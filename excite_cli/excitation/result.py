@@ -43,18 +43,17 @@ class Result(Shown):
     checked_pairs: tuple[str, ...] = ()
     dropped_pairs: tuple[str, ...] = ()
 
-    def plot(self, motion: int | None = None, ax: Any = None) -> Any:
-        """Positions, speeds and accelerations of all joints in time [rad, m, s], of one motion.
+    def plot(self, motion: int | None = None, joint: str | None = None, ax: Any = None) -> Any:
+        """Position, speed, acceleration in time [rad, m, s] of a motion, by default the last.
 
-        By default the last one; in `ax` (matplotlib) of yours positions alone. The axes are
-        returned.
+        A row per joint; in `ax` (matplotlib) one joint's position. Axes are returned.
 
         Raises
         ------
         ConfigError, RobotError, MissingExtraError
-            There is no such motion; the URDF is gone; matplotlib is not installed.
+            There is no such motion or joint; the URDF is gone; matplotlib is not installed.
         """
-        return drawn(self, "plot", motion, ax)
+        return drawn(self, "plot", motion, joint, ax)
 
     @property
     def effect_names(self) -> tuple[str, ...]:

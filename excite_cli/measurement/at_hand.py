@@ -1,6 +1,6 @@
-"""Arrays and tables at hand in Python as named columns, those of a CSV."""
+"""Arrays and tables at hand in Python as columns with names, those of a CSV."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,74 +8,80 @@ from numpy.typing import NDArray
 
 from excite_cli.errors import ConfigError
 
-Array = NDArray[np.float64]
+Columns = dict[str, NDArray[np.float64]]
+_PER_JOINT = ("q", "dq", "tau")
 
 
-def refuse_twice(what: str, names: Sequence[str]) -> None:
-    """Raise ConfigError where `what` names something twice."""
-    twice = [name for k, name in enumerate(names) if name in names[:k]]
-    if twice:
-        raise ConfigError(f"{what}: '{twice[0]}' is there twice. Give each its own name.")
-
-
-def columns_of(
-    arrays: Mapping[str, Any], joints: tuple[str, ...], single: Sequence[str]
-) -> dict[str, Array]:
-    """Columns (T,) of one recording: those `single` have one, q, tau and dq one for each joint."""
-    n, found = len(joints), {}
-    count = len(arrays["t"]) if np.ndim(arrays["t"]) else 0
-    for key, values in arrays.items():
-        x = _numbers(key, values)
-        matrix = x[:, None] if x.ndim == 1 and n == 1 and key in ("q", "tau", "dq") else x
-        flat, wide = [(count,)], [(count, n)]
-        allowed = flat if key in ("t", *single) else wide if key in ("q", "tau", "dq") else None
-        if matrix.shape not in (allowed or [*flat, *wide]):
-            shapes = " or ".join(map(str, allowed or [*flat, *wide]))
-            turned = " It looks transposed." if x.T.shape in wide and n != count else ""
-            raise ConfigError(
-                f"{key} has shape {x.shape}; expected {shapes}: a row for each of the {count} "
-                f"instants of t{'' if key == 't' else f', joints {n}'}.{turned}"
-            )
-        if matrix.ndim == 1:
-            found[key] = matrix
-        else:
-            found |= {f"{key}_{joint}": matrix[:, j] for j, joint in enumerate(joints)}
+def names_of(names: Sequence[str], count: int) -> list[str]:
+    """Those of so many recordings; ConfigError where they are not as many different ones."""
+    found = [*names] or (["run"] if count == 1 else [f"run_{k + 1}" for k in range(count)])
+    if isinstance(names, str) or not len({*found}) == len(found) == count > 0 or not all(found):
+        raise ConfigError(f"names is {names!r}. Give each of {count} recordings one of its own.")
     return found
 
 
-def _numbers(key: str, values: Any) -> Array:
+def tables_of(
+    joints: Sequence[str], given: Mapping[str, Any], single: Collection[str]
+) -> Iterator[Columns]:
+    """Columns of every recording in arrays, or in lists of them; those `single` are (T,)."""
+    if isinstance(joints, str) or len({*joints}) != len(joints):
+        raise ConfigError(f"joint_names is {joints!r}. Give a list of different names.")
+    times = given["t"]
+    several = isinstance(times, list | tuple) and any(np.ndim(each) for each in times)
+    lists = {key: x if several else [x] for key, x in given.items() if x is not None}
+    for key, x in lists.items():
+        if not isinstance(x, list | tuple) or len(x) != len(lists["t"]):
+            raise ConfigError(f"{key}: give a list of {len(times)} arrays, as t is one.")
+    for k in range(len(lists["t"])):
+        count, found = np.size(lists["t"][k]), Columns()
+        for key, x in lists.items():
+            values = _numbers(key, x[k])
+            wide = (count, len(joints))
+            fits = [wide] * (key not in ("t", *single)) + [(count,)] * (key not in _PER_JOINT)
+            if values.shape not in fits:
+                raise ConfigError(
+                    f"{key} has shape {values.shape}; expected {' or '.join(map(str, fits))}: "
+                    f"{count} instants, {len(joints)} joints, a row per instant."
+                )
+            own = {key: values} if values.ndim == 1 else None
+            found |= own or {f"{key}_{j}": x for j, x in zip(joints, values.T, strict=True)}
+        yield found
+
+
+def _numbers(key: str, values: Any) -> NDArray[np.float64]:
     try:
         return np.asarray(values, dtype=float)
     except (TypeError, ValueError) as error:
         raise ConfigError(f"{key} does not hold numbers: {error}. Give an array.") from error
 
 
-def columns_in(frame: Any) -> tuple[dict[str, Array], list[str]]:
+def columns_in(frame: Any) -> tuple[Columns, list[str]]:
     """Columns (T,) of a table that hold numbers or dates (s from 1970), and names of others."""
-    listed = getattr(frame, "column_names", None)
-    listed = getattr(frame, "columns", None) if listed is None else listed
-    if listed is None and not isinstance(frame, Mapping):
+    listed = frame if isinstance(frame, Mapping) else getattr(frame, "columns", None)
+    listed = getattr(frame, "column_names", listed)  # of Arrow
+    if listed is None:
+        kind = type(frame).__name__
         raise ConfigError(
-            f"frame is {type(frame).__name__}. Give a table with columns by name: t, q_<joint>, …, "
-            "tau_<joint>, …"
+            f"frame is {kind}. Give a table with columns t, q_<joint>, tau_<joint>, …"
         )
-    found: dict[str, Array] = {}
-    words: list[str] = []
-    count = None
-    for name in frame if listed is None else listed:
-        column = np.asarray(frame[name])
-        count = column.shape[:1] if count is None else count
-        if column.shape != count or not count:
-            raise ConfigError(
-                f"column '{name}' has shape {column.shape}; expected {count or '(T,)'} as the "
-                "first one. Give a value per instant in each."
-            )
+    columns = {str(name): np.asarray(frame[name]) for name in listed}
+    shapes = {column.shape for column in columns.values()}
+    if len(shapes) != 1 or min(map(len, shapes)) != 1 or max(shapes)[0] < 2:
+        told = ", ".join(f"{name} {column.shape}" for name, column in columns.items())
+        raise ConfigError(f"columns have shapes {told or '()'}. Give a value per instant in each.")
+    found: Columns = {}
+    for name, column in columns.items():
         if column.dtype.kind == "M":
             seconds = column.astype("datetime64[us]").astype(np.int64) / 1e6
-            found[str(name)] = np.where(np.isnat(column), np.nan, seconds)
-            continue
-        try:
-            found[str(name)] = column.astype(float)
-        except (TypeError, ValueError):
-            words.append(str(name))
-    return found, words
+            found[name] = np.where(np.isnat(column), np.nan, seconds)
+        elif column.dtype.kind in "biuf" or _is_numeric(column):
+            found[name] = column.astype(float)
+    return found, [name for name in columns if name not in found]
+
+
+def _is_numeric(column: NDArray[Any]) -> bool:
+    try:
+        column.astype(float)
+    except (TypeError, ValueError):
+        return False
+    return True

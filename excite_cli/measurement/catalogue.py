@@ -14,7 +14,7 @@ from excite_cli.measurement.base_channel import channels_of_base
 from excite_cli.measurement.covariates import DeclaredCovariates
 from excite_cli.measurement.csv_reader import run_of_table
 from excite_cli.measurement.csv_table import NamedColumns
-from excite_cli.measurement.dataset import FROM_PYTHON, Array, Dataset, Finding, Run
+from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
 from excite_cli.measurement.joined_files import is_part, with_joined
 from excite_cli.measurement.missing_values import known_stamps
 from excite_cli.measurement.motors import Motors
@@ -142,9 +142,9 @@ def read_dataset(
 
 def _from_python(data: Dataset, options: ReadOptions) -> Iterator[tuple[Path, list[RawRun]]]:
     """Runs of arrays as the tables that they would be in files."""
-    place = Path(FROM_PYTHON)
+    place = Path("data from Python")
     for run in data.runs:
-        raw = run_of_table(place, NamedColumns(data.columns(run)), options)
+        raw = run_of_table(place, NamedColumns(run.extra), options)
         yield from with_joined([(place, [replace(raw, name=run.name)])], options)
 
 

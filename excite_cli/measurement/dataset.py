@@ -11,8 +11,7 @@ from typing import Any, Literal, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.errors import ConfigError
-from excite_cli.measurement.at_hand import columns_in, columns_of, refuse_twice
+from excite_cli.measurement.at_hand import columns_in, names_of, tables_of
 from excite_cli.measurement.run_identity import Origin, Part, RunId
 from excite_cli.out_of_core import Spool
 from excite_cli.shown.answer import Shown
@@ -21,7 +20,6 @@ _BEFORE = 20.0  # s: longer ago is forgotten
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Severity = Literal["note", "warning", "error"]
-FROM_PYTHON = "data from Python"  # what messages call those of no file
 Given = Array | Sequence[Array]  # of one recording, or of each of several
 
 
@@ -154,8 +152,8 @@ class Run(Shown):
 class Dataset(Shown):
     """Runs of one robot; columns are in the order of `joint_names`.
 
-    Those `as_given` are arrays in units of their own: what is called with them and a config reads
-    them as `measurement` says, as a file with the same columns; `load_data` does so, too.
+    Those `as_given` are in units of their own, with all their columns in `extra`: functions that
+    have a config read these as they would those of a CSV. `load_data` does so alone.
     """
 
     joint_names: tuple[str, ...]
@@ -180,10 +178,9 @@ class Dataset(Shown):
         """Recordings at hand: t (T,), positions q, torques tau and speeds dq (T, n).
 
         Units and signs are those that the config's `measurement` declares (by default s, rad or m,
-        N·m or N), and the checks of files are made of them. `covariates` (T,) are columns that the
-        config declares for effects to follow, such as a temperature; `extra` further channels, (T,)
-        or (T, n) with a column per joint, such as a current. Of several recordings all of these
-        are lists with an array for each; `names` are theirs.
+        N·m or N), and the checks of files are made of them. `covariates` (T,), such as a
+        temperature, and `extra` channels, (T,) or (T, n) with a column per joint, are found by
+        their names. Of several recordings all are lists of arrays; `names` are theirs.
 
         Raises
         ------
@@ -197,82 +194,30 @@ class Dataset(Shown):
         >>> Dataset.from_arrays(["hip", "knee"], t, q, 3.0 * q).recordings
         ('run',)
         """
-        joints = tuple(joint_names)
-        if isinstance(joint_names, str) or not all(isinstance(j, str) and j for j in joints):
-            raise ConfigError(f"joint_names is {joint_names!r}. Give a list of the joints' names.")
-        refuse_twice("joint_names", joints)
-        refuse_twice("columns", ["t", "q", "tau", "dq", *(covariates or {}), *(extra or {})])
-        several = isinstance(t, list | tuple) and any(np.ndim(each) for each in t)
         given = {"t": t, "q": q, "tau": tau, "dq": dq, **(covariates or {}), **(extra or {})}
-        lists: dict[str, Any] = {
-            k: x if several else [x] for k, x in given.items() if x is not None
-        }
-        for key, x in lists.items():
-            if not isinstance(x, list | tuple) or len(x) != len(lists["t"]):
-                raise ConfigError(
-                    f"t is a list of {len(lists['t'])} recordings, and {key} is not. Give a list "
-                    "with an array for each."
-                )
-        columns = [
-            columns_of({key: x[k] for key, x in lists.items()}, joints, [*(covariates or {})])
-            for k in range(len(lists["t"]))
-        ]
-        return cls._of_columns(joints, columns, names)
+        tables = tables_of(joint_names, given, covariates or ())
+        return replace(cls.from_frame([*tables], names=names), joint_names=tuple(joint_names))
 
     @classmethod
     def from_frame(cls, frame: Any, *, names: Sequence[str] = ()) -> Self:
         """Recordings in tables with the columns of a CSV: `t`, `q_<joint>`, `tau_<joint>`, ….
 
         `frame` is a pandas DataFrame, or anything else that has its columns by name (polars, Arrow,
-        a dict of arrays); of several recordings a list, whose `names` are given. Otherwise as
-        `from_arrays`: a CSV of the same columns gives the same numbers.
+        a dict of arrays); of several recordings a list. Otherwise as `from_arrays`.
 
         Raises
         ------
         ConfigError
             It is no table, or columns have different lengths.
-
-        Examples
-        --------
-        >>> t = np.arange(100) / 50.0
-        >>> Dataset.from_frame({"t": t, "q_hip": np.sin(t), "tau_hip": t}).joint_names
-        ('hip',)
         """
-        tables, words = [], []
-        for each in frame if isinstance(frame, list | tuple) else [frame]:
-            columns, left = columns_in(each)
-            tables.append(columns)
-            words += left
-        own = (key for key in (tables[0] if tables else {}) if not key.startswith("q_cmd_"))
-        joints = tuple(key[2:] for key in own if key.startswith("q_"))
-        text = f"columns of words are left out: {', '.join(dict.fromkeys(words))}"
-        found = cls._of_columns(joints, tables, names)
-        return replace(found, findings=(Finding("words", "note", text),) if words else ())
-
-    @classmethod
-    def _of_columns(
-        cls, joints: tuple[str, ...], tables: Sequence[Mapping[str, Array]], names: Sequence[str]
-    ) -> Self:
-        if isinstance(names, str) or (names and len(names) != len(tables)):
-            raise ConfigError(f"names is {names!r}. Give a name for each of {len(tables)} runs.")
-        if not tables:
-            raise ConfigError("There is no recording. Give one at least.")
-        called = [*map(str, names)] or [f"run_{k}" for k in range(1, len(tables) + 1)]
-        if len(tables) == 1 and not names:
-            called = ["run"]
-        refuse_twice("names", called)
-        runs = (_as_given(name, joints, each) for name, each in zip(called, tables, strict=True))
-        return cls(joints, tuple(runs), as_given=True)
-
-    def columns(self, run: Run) -> dict[str, Array]:
-        """A run as it was given: columns (T,) as in a CSV; what is all NaN was not there."""
-        found = {"t": run.t, **run.extra}
-        for channel in ("q", "dq", "tau"):
-            matrix = getattr(run, channel)
-            if matrix is not None:
-                own = zip(self.joint_names, matrix.T, strict=True)
-                found |= {f"{channel}_{joint}": column for joint, column in own}
-        return {name: x for name, x in found.items() if name in run.extra or not np.isnan(x).all()}
+        tables = [columns_in(x) for x in (frame if isinstance(frame, list | tuple) else [frame])]
+        called = names_of(names, len(tables))
+        own = (key for columns, _ in tables[:1] for key in columns if key.startswith("q_"))
+        joints = tuple(key[2:] for key in own if not key.startswith("q_cmd_"))
+        runs = (_as_given(name, joints, x) for name, (x, _) in zip(called, tables, strict=True))
+        words = ", ".join(dict.fromkeys(word for _, left in tables for word in left))
+        found = Finding("words", "note", f"columns of words are left out: {words}")
+        return cls(joints, tuple(runs), (), (found,) if words else (), as_given=True)
 
     @property
     def recordings(self) -> tuple[str, ...]:
@@ -285,23 +230,14 @@ class Dataset(Shown):
         return tuple(dict.fromkeys((*self.recordings, *(run.id.key for run in self.runs))))
 
 
-def _as_given(name: str, joints: tuple[str, ...], columns: Mapping[str, Array]) -> Run:
-    """The run of these columns; of t, q and tau that are not there NaN."""
-    left = dict(columns)
-    count = len(next(iter(columns.values()), ()))
-    if count < 2:
-        raise ConfigError(
-            f"run {name} has {count} samples. Give several seconds, a row per instant."
-        )
-    matrices = {}
-    for channel in ("q", "dq", "tau"):
-        own = [f"{channel}_{joint}" for joint in joints]
-        if own and all(each in left for each in own):
-            matrices[channel] = np.column_stack([left.pop(each) for each in own])
-    nothing = np.full((count, len(joints)), np.nan)
-    t = left.pop("t", np.full(count, np.nan))
-    q, tau = (matrices.get(channel, nothing) for channel in ("q", "tau"))
-    return Run(name, t, q, tau, matrices.get("dq"), extra=left)
+def _as_given(name: str, joints: Sequence[str], columns: dict[str, Array]) -> Run:
+    """NaN where there is no such column."""
+    nothing = np.full(len(next(iter(columns.values()))), np.nan)
+    q, tau = (
+        np.array([columns.get(f"{channel}_{joint}", nothing) for joint in joints]).T
+        for channel in ("q", "tau")
+    )
+    return Run(name, columns.get("t", nothing), q, tau, extra=columns)
 
 
 # Findings of one kind as one sentence: the first as it is, of the others where they are.

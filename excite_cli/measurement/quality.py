@@ -14,15 +14,7 @@ import numpy as np
 from excite_cli.config.data_spec import MeasurementSpec
 from excite_cli.errors import FileError
 from excite_cli.measurement.covariates import without_missing_covariates
-from excite_cli.measurement.dataset import (
-    FROM_PYTHON,
-    Array,
-    Dataset,
-    Finding,
-    Mask,
-    Run,
-    merged,
-)
+from excite_cli.measurement.dataset import Array, Dataset, Finding, Mask, Run, merged
 from excite_cli.measurement.dead_channels import dead_channels
 from excite_cli.measurement.missing_values import without_missing
 from excite_cli.measurement.recording_limits import RecordingLimits
@@ -234,7 +226,7 @@ def raise_for_errors(dataset: Dataset) -> None:
     errors = [found for found in dataset.findings if found.severity == "error"]
     if errors:
         lines = "".join(f"\n- {sentence(found)}" for found in merged(errors))
-        where = ", ".join(dataset.sources) or FROM_PYTHON
+        where = ", ".join(dataset.sources) or "data from Python"
         raise FileError(f"{where}: these data cannot be used:{lines}")
 
 

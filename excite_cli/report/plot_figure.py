@@ -130,7 +130,7 @@ def save_pages(figures: Iterable["Figure"], path: Path) -> None:
             figure.savefig(file, format="pdf")
 
 
-COLOURS: dict[Colour, str] = {
+_COLOURS: dict[Colour, str] = {
     "ink": "black", "muted": GREY, "blue": BLUE, "vermilion": VERMILION, "green": GREEN,
     "purple": PURPLE,
 }  # fmt: skip
@@ -194,7 +194,7 @@ def _plot_figure_draw(figure: "Figure", grid: Any, plot: Plot, title: str) -> No
         axes.tick_params(pad=2, labelbottom=number == len(plot.panels) - 1)
         for low, high in plot.shaded:
             axes.axvspan(low, high, color=HELD_OUT, linewidth=0, label="_")
-        _draw_panel(axes, plot.x, panel)
+        draw_panel(axes, plot.x, panel)
         if plot.counted and len(plot.x) <= _LABELLED:
             _label(axes, plot.x, panel)
         axes.set_ylabel(panel.axis, labelpad=2)
@@ -207,7 +207,8 @@ def _plot_figure_draw(figure: "Figure", grid: Any, plot: Plot, title: str) -> No
     )
 
 
-def _draw_panel(axes: "Axes", x: Array, panel: Panel) -> None:
+def draw_panel(axes: "Axes", x: Array, panel: Panel) -> None:
+    """All series of a panel over x (T,), and its axis."""
     for series in panel.series:
         _draw_series(axes, x, series)
     if panel.logarithmic:
@@ -232,7 +233,7 @@ def _label(axes: "Axes", x: Array, panel: Panel) -> None:
     }
     for (at, y), colour in told.items():
         axes.annotate(f"{y:.3g}", (at, y), xytext=(0, 5), textcoords="offset points", ha="center",
-                      color=COLOURS[colour], fontsize=8.5)  # fmt: skip
+                      color=_COLOURS[colour], fontsize=8.5)  # fmt: skip
 
 
 def _forbidden(
@@ -246,7 +247,7 @@ def _forbidden(
 
 def _draw_series(axes: "Axes", x: Array, series: Curve) -> None:
     there = ~np.isinf(series.y)
-    colour = COLOURS[series.colour]
+    colour = _COLOURS[series.colour]
     axes.plot(x[there], series.y[there], color=colour, label=series.label, **_LOOKS[series.look])
     if series.low is not None and series.high is not None:
         ends = np.stack([series.low, series.high])[:, there & np.isfinite(series.low)]
@@ -270,7 +271,7 @@ def _draw_rows(axes: "Axes", chart: RowsChart) -> None:
     named: dict[str, list[tuple[int, Mark]]] = {}
     for number, row in enumerate(chart.rows):
         for bar in row.bars:
-            axes.hlines(number, bar.low, bar.high, color=COLOURS[bar.colour], linewidth=1.0)
+            axes.hlines(number, bar.low, bar.high, color=_COLOURS[bar.colour], linewidth=1.0)
         for mark in row.marks:
             named.setdefault(mark.word, []).append((number, mark))
     for word, marks in named.items():
@@ -278,7 +279,7 @@ def _draw_rows(axes: "Axes", chart: RowsChart) -> None:
         axes.plot(
             [mark.x for _, mark in marks],
             [number for number, _ in marks],
-            color=COLOURS[first.colour],
+            color=_COLOURS[first.colour],
             label=word,
             linestyle="none",
             clip_on=False,

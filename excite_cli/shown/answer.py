@@ -244,16 +244,16 @@ def _text(text: str) -> str:
     return escape(text).replace("\n", "<br>")
 
 
-Told = TypeVar("Told", contravariant=True)
-# Rows of a table by its name, and what its columns are called where it has none.
-Tables = Mapping[str, tuple[tuple[str, ...], Callable[[Told], Iterable[Mapping[str, Any]]]]]
+# Rows of a table by its name: values by the names of their columns.
+Tables = Mapping[str, Callable[[Any], list[dict[str, Any]]]]
+_OF_EFFECTS = ("effect", "joints", "parameter", "value", "std", "unit")  # where there are none
 
 
 @dataclass(frozen=True)
 class _Shown:
     words: Callable[[Any], str]
     parts: Callable[[Any], Parts]
-    tables: Tables[Any]
+    tables: Tables
     plots: Mapping[str, Callable[..., Any]]
 
 
@@ -276,11 +276,9 @@ class Shown:
         return None if found is None else as_html(found.parts(self))
 
     def table(self, name: str) -> Any:
-        """A pandas DataFrame of numbers: "effects", "errors" or "parameters".
+        """A pandas DataFrame of a diagnosis or fit: "effects", "errors" or "parameters".
 
-        A diagnosis and an identification have all three. Values of different kinds stand in one
-        column, and their units in the column `unit`; columns `error…` are shares of the joint's
-        torque (RMS), `share…` and `gain` shares as well.
+        `unit` is that of `value`, or of `rms_…`; `error_…`, `share…` and `gain` are shares.
 
         Raises
         ------
@@ -302,9 +300,8 @@ class Shown:
             raise MissingExtraError(
                 "Tables need pandas, which is not installed. Run: pip install 'excite-cli[tables]'"
             ) from error
-        columns, rows = tables[name]
-        told = list(rows(self))
-        return pandas.DataFrame(told, columns=[*(told[0] if told else columns)])
+        rows = tables[name](self)
+        return pandas.DataFrame(rows, columns=None if rows else _OF_EFFECTS)
 
 
 T = TypeVar("T", bound=Shown)
@@ -314,7 +311,7 @@ def show(
     kind: type[T],
     words: Callable[[T], str],
     parts: Callable[[T], Parts],
-    tables: Tables[T] = MappingProxyType({}),
+    tables: Tables = MappingProxyType({}),
     **plots: Callable[..., Any],
 ) -> None:
     """State how records of `kind` are shown: in words (inside brackets), as tables, as numbers.

@@ -1,7 +1,6 @@
 """The evidence of every effect that a diagnosis found, as cards; small ones are folded."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -21,7 +20,6 @@ from excite_cli.effects.base import Effect, Picture
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.report.effect_chart import Cloud, cloud_of, cloud_plot, together, window_plot
 from excite_cli.report.plot import Plot
-from excite_cli.report.record_plots import chosen_joints, plot_friction
 from excite_cli.shown.answer import Block, Charts, Detail, Fold, Section
 from excite_cli.summary.named_effects import joint_alias_in_words, other_names
 
@@ -130,32 +128,25 @@ def _over_speed(trace: EffectTrace) -> bool:
 
 def friction_plots(found: Diagnosis, traces: Traces) -> tuple[Plot, ...]:
     """For each joint with several effects over its speed: all of them at once."""
-    charts = []
-    for joint in found.joint_names:
-        parts = _friction_of(joint, traces)
-        if len(parts) > 1 and _same_samples(parts):
-            names = ", ".join(trace.kind for trace in parts)
-            cloud = _friction_cloud(found, joint, parts)
-            charts.append(cloud_plot(f"Friction of {joint}", cloud, f"{names}."))
-    return tuple(charts)
+    return tuple(
+        cloud_plot(f"Friction of {joint}", cloud, f"{', '.join(trace.kind for trace in parts)}.")
+        for joint, (cloud, parts) in friction_clouds(found, traces).items()
+        if len(parts) > 1
+    )
 
 
-def _friction_of(joint: str, traces: Traces | None) -> list[EffectTrace]:
-    every = traces.effects if traces else ()
-    return [t for t in every if _over_speed(t) and t.rows == (joint,) and not t.runs]
-
-
-def _friction_cloud(found: Diagnosis, joint: str, parts: Sequence[EffectTrace]) -> Cloud:
-    unit = found.torque_units[found.joint_names.index(joint)]
-    return together([cloud_of(trace, 0, unit) for trace in parts])
-
-
-def draw_friction(found: Diagnosis, joint: str, ax: Any) -> Any:
-    """What `Diagnosis.plot_friction` draws: of parts with other samples, the first."""
-    parts = {each: _friction_of(each, found.traces) for each in found.joint_names}
-    chosen_joints(joint, [each for each, own in parts.items() if own], ax)
-    own = parts[joint] if _same_samples(parts[joint]) else parts[joint][:1]
-    return plot_friction(_friction_cloud(found, joint, own), joint, ax)
+def friction_clouds(
+    found: Diagnosis, traces: Traces | None
+) -> dict[str, tuple[Cloud, list[EffectTrace]]]:
+    """By the joint, effects over its speed as one; of those with different samples the first."""
+    clouds = {}
+    for joint, unit in zip(found.joint_names, found.torque_units, strict=True):
+        every = traces.effects if traces else ()
+        parts = [t for t in every if _over_speed(t) and t.rows == (joint,) and not t.runs]
+        if parts and np.isfinite(parts[0].partial).any():
+            parts = parts if _same_samples(parts) else parts[:1]
+            clouds[joint] = together([cloud_of(trace, 0, unit) for trace in parts]), parts
+    return clouds
 
 
 def _same_samples(parts: Sequence[EffectTrace]) -> bool:

@@ -73,7 +73,7 @@ def error_tables(found: Diagnosis, detail: Detail) -> list[Table]:
 
 def _moving(found: Diagnosis) -> Table:
     rows = []
-    for joint, unit in measured_joints(found):
+    for joint, unit in _joints(found):
         row = _row(found, joint, unit, moving=True)
         if found.noise_floor is not None:
             row["noise floor"] = figure(found.noise_floor.get(joint, nan))
@@ -128,7 +128,7 @@ def errors_by_model(found: Diagnosis) -> dict[str, Errors]:
     return {head: each for head, each in known.items() if each is not None}
 
 
-def measured_joints(found: Diagnosis) -> Iterator[tuple[str, str]]:
+def _joints(found: Diagnosis) -> Iterator[tuple[str, str]]:
     """Those whose torque was measured, with its unit."""
     every = zip(found.joint_names, found.torque_units, strict=True)
     return ((joint, unit) for joint, unit in every if not isnan(found.after.rms[joint]))
@@ -179,7 +179,7 @@ def _taken_off(found: Diagnosis, joint: str) -> str:
 
 def _parts(found: Diagnosis) -> Table:
     """Every joint's way from the first error to the last, by all that takes a part off."""
-    begin, unit = found.baseline, dict(measured_joints(found))
+    begin, unit = found.baseline, dict(_joints(found))
     rows: list[tuple[str, ...]] = []
     parted: list[int] = []
     for joint in found.joint_names:
@@ -213,7 +213,7 @@ def _parts(found: Diagnosis) -> Table:
 
 
 def _all_samples(found: Diagnosis) -> Table:
-    rows = [_row(found, joint, unit, moving=False) for joint, unit in measured_joints(found)]
+    rows = [_row(found, joint, unit, moving=False) for joint, unit in _joints(found)]
     title = (
         f"Over all samples of {found.held_out_run}, including joints at rest (unfiltered: with "
         "effects, the torque as recorded)"

@@ -375,11 +375,7 @@ show(
     _in_words,
     identification_parts,
     OF_IDENTIFICATION,
-    plot_residual=lambda found, *of: plot_residual(
-        sorted(found.traces, key=lambda trace: not trace.held_out),
-        dict(zip(found.fit.joint_names, found.torque_units, strict=True)),
-        *of,
-    ),
+    plot_residual=plot_residual,
 )
 show(StoredFit, _in_words, _stored_parts, OF_IDENTIFICATION)
 

@@ -49,8 +49,8 @@ def test_effects_of_a_fit_are_told_as_people_know_them(loop: Loop) -> None:
 
 def test_errors_are_those_by_joint(fitted: Identification, found: Diagnosis) -> None:
     table = fitted.table("errors").set_index("joint")
-    assert dict(table["error"]) == fitted.error.relative_moving
-    assert dict(table["rms"]) == fitted.error.rms
+    assert dict(table["error_held_out"]) == fitted.error.relative_moving
+    assert dict(table["rms_held_out"]) == fitted.error.rms_moving
     assert list(table["unit"]) == ["N·m", "N"]
     table = found.table("errors").set_index("joint")
     assert dict(table["error_declared"]) == found.before.relative_moving
@@ -67,22 +67,11 @@ def test_effects_have_a_row_for_every_number(found: Diagnosis) -> None:
     assert list(friction["unit"]) == ["N·m"]
     assert table["p_value"].dtype == float
     assert len(table) == sum(len(each.parameters) for each in found.effects)
-    assert list(replace(found, effects=()).table("effects")) == list(table)
-    whole = found.table("parameters").set_index("parameter")
-    assert whole.loc["coulomb_friction.coulomb[elbow]", "value"] == value
-    np.testing.assert_array_equal(whole["value"][: len(found.phi)], found.phi)
-    assert whole.loc[found.inertia_names[0], "unit"] == "kg"
-
-
-def test_a_declared_effect_is_in_the_model_in_the_units_of_its_joint(
-    found: Diagnosis, fitted: Identification
-) -> None:
-    record = found.effects[0].effect
-    slides = replace(record, kind="viscous_friction", joints=("slide",), values=(3.0,))
-    turns = replace(slides, joints=("elbow",))
-    rows = replace(found, declared=(slides, turns)).table("parameters").set_index("parameter")
-    assert rows.loc["viscous_friction.viscous[slide]", "unit"] == "N·s/m"
-    assert rows.loc["viscous_friction.viscous[elbow]", "unit"] == "N·m·s/rad"
+    assert {*replace(found, effects=()).table("effects")} < {*table}
+    inertias = found.table("parameters")
+    np.testing.assert_array_equal(inertias["value"], found.phi)
+    assert tuple(inertias["parameter"]) == found.inertia_names
+    assert inertias["unit"][0] == "kg"
 
 
 def test_what_there_is_not_is_said(fitted: Identification, monkeypatch: pytest.MonkeyPatch) -> None:
