@@ -77,12 +77,10 @@ if TYPE_CHECKING:
     from excite_cli.excitation.result import Comparison as Comparison
     from excite_cli.excitation.result import Result as Result
     from excite_cli.identification.carried_load import LoadIdentification as LoadIdentification
-    from excite_cli.identification.errors_of_torque import Errors as Errors
     from excite_cli.identification.fit import Fit as Fit
     from excite_cli.identification.identify import Identification as Identification
     from excite_cli.identification.stored_model import StoredFit as StoredFit
     from excite_cli.measurement.dataset import Dataset as Dataset
-    from excite_cli.measurement.dataset import Finding as Finding
     from excite_cli.measurement.dataset import Run as Run
     from excite_cli.proposal.propose import Proposal as Proposal
     from excite_cli.robot.overview import DescribedRobot as DescribedRobot
@@ -143,7 +141,6 @@ _HOMES = {
     "effects.base": ("Effect",),
     "excitation.gradient_check": ("GradientCheck",),
     "identification.stored_model": ("StoredFit",),
-    "identification.errors_of_torque": ("Errors",),
     "robot.overview": ("DescribedRobot",),
     "shown.answer": ("Answer",),
     "study.records": ("CaseRecord",),
@@ -162,7 +159,7 @@ _HOMES = {
     "identification.fit": ("Fit",),
     "identification.identify": ("Identification",),
     "identification.carried_load": ("LoadIdentification",),
-    "measurement.dataset": ("Dataset", "Finding", "Run"),
+    "measurement.dataset": ("Dataset", "Run"),
     "proposal.propose": ("Proposal",),
     "scoring.changes": ("Change", "Changes"),
     "scoring.records": ("Replay", "Score", "ScoredRun", "SetPointReplay"),

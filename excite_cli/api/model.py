@@ -13,7 +13,7 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.errors import ConfigError
 from excite_cli.export.drive import drive_of
-from excite_cli.export.engines import mujoco_model, pinocchio_model
+from excite_cli.export.engines import pinocchio_model
 from excite_cli.export.exported import in_words
 from excite_cli.export.mjcf import held_by_actuators, joint_parts, mjcf
 from excite_cli.identification.identified_model import IdentifiedModel
@@ -22,6 +22,7 @@ from excite_cli.identification.stored_model import StoredModel
 from excite_cli.robot.model import Array
 from excite_cli.shown.answer import Shown, show
 from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.simulation.mujoco_model import load_mujoco, silent_engine
 from excite_cli.store.model_file import consistent_model, read_model
 
 
@@ -71,7 +72,7 @@ class Model(Shown):
 
     @property
     def consistent(self) -> "Model":
-        """The same of bodies that can be, which engines ask for; itself where nobody knows one."""
+        """The same of bodies that can be, which engines ask for."""
         found = consistent_model(self.made)
         return Model(replace(self.made, model=found, consistent=found))
 
@@ -83,8 +84,7 @@ class Model(Shown):
         forward dynamics fails: take `consistent`.
         """
         found, left = pinocchio_model(self.made.robot, self._standing)
-        if left:
-            words = in_words(left, self.joint_names)
+        if words := in_words(left, self.joint_names):
             tell(Note(Level.WARNING, f"pin.rnea leaves out: {words}. Model.torque has all"))
         return found
 
@@ -106,7 +106,8 @@ class Model(Shown):
         left = [effect for effect in beside if not held_by_actuators(effect, drive)]
         for note in (*lost, *exported.notes):
             tell(Note(Level.WARNING if lost or left else Level.NOTE, note))
-        return mujoco_model(exported.text)
+        with silent_engine():
+            return load_mujoco().MjModel.from_xml_string(exported.text)
 
     @property
     def _standing(self) -> IdentifiedModel:

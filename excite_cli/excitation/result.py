@@ -12,7 +12,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import RandomBaseline, RandomMotion
 from excite_cli.excitation.sequence import FinishedMotion
 from excite_cli.robot.model import Array
-from excite_cli.shown.answer import Shown, drawn
+from excite_cli.shown.answer import Shown, offered
 
 
 @dataclass(frozen=True, repr=False)
@@ -53,7 +53,7 @@ class Result(Shown):
         ConfigError, RobotError, MissingExtraError
             There is no such motion or joint; the URDF is gone; matplotlib is not installed.
         """
-        return drawn(self, "plot", motion, joint, ax)
+        return offered(self)["plot"](self, motion, joint, ax)
 
     @property
     def effect_names(self) -> tuple[str, ...]:

@@ -48,7 +48,7 @@ from excite_cli.identification.torque_trace import TorqueTrace, torque_trace, to
 from excite_cli.measurement.campaign_clock import Recorded, recorded
 from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.robot.model import Robot
-from excite_cli.shown.answer import Shown, drawn
+from excite_cli.shown.answer import Shown, offered
 
 Tell = Callable[[str], None]
 # Parameters this many standard deviations below zero that cannot be negative are reported.
@@ -85,7 +85,7 @@ class Identification(Shown):
 
         As `Diagnosis.plot_residual`.
         """
-        return drawn(self, "plot_residual", joint, ax)
+        return offered(self)["plot_residual"](self, joint, ax)
 
 
 def identify(

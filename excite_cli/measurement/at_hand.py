@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 from excite_cli.errors import ConfigError
 
 Columns = dict[str, NDArray[np.float64]]
-_PER_JOINT = ("q", "dq", "tau")
 
 
 def names_of(names: Sequence[str], count: int) -> list[str]:
     """Those of so many recordings; ConfigError where they are not as many different ones."""
     found = [*names] or (["run"] if count == 1 else [f"run_{k + 1}" for k in range(count)])
-    if isinstance(names, str) or not len({*found}) == len(found) == count > 0 or not all(found):
+    if isinstance(names, str) or not len({*found}) == len(found) == count > 0:
         raise ConfigError(f"names is {names!r}. Give each of {count} recordings one of its own.")
     return found
 
@@ -26,45 +25,36 @@ def tables_of(
     """Columns of every recording in arrays, or in lists of them; those `single` are (T,)."""
     if isinstance(joints, str) or len({*joints}) != len(joints):
         raise ConfigError(f"joint_names is {joints!r}. Give a list of different names.")
-    times = given["t"]
-    several = isinstance(times, list | tuple) and any(np.ndim(each) for each in times)
+    several = isinstance(given["t"], list | tuple) and any(np.ndim(each) for each in given["t"])
     lists = {key: x if several else [x] for key, x in given.items() if x is not None}
     for key, x in lists.items():
         if not isinstance(x, list | tuple) or len(x) != len(lists["t"]):
-            raise ConfigError(f"{key}: give a list of {len(times)} arrays, as t is one.")
-    for k in range(len(lists["t"])):
-        count, found = np.size(lists["t"][k]), Columns()
+            raise ConfigError(f"{key}: give a list of {len(lists['t'])} arrays, as t is one.")
+    for k, t in enumerate(lists["t"]):
+        count, found = np.size(t), Columns()
         for key, x in lists.items():
-            values = _numbers(key, x[k])
-            wide = (count, len(joints))
-            fits = [wide] * (key not in ("t", *single)) + [(count,)] * (key not in _PER_JOINT)
-            if values.shape not in fits:
+            values = np.asarray(x[k])
+            wide = [(count, len(joints))] * (key not in ("t", *single))
+            fits = wide + [(count,)] * (key not in ("q", "dq", "tau"))
+            if values.shape not in fits or values.dtype.kind not in "biuf":
                 raise ConfigError(
-                    f"{key} has shape {values.shape}; expected {' or '.join(map(str, fits))}: "
-                    f"{count} instants, {len(joints)} joints, a row per instant."
+                    f"{key} has shape {values.shape} ({values.dtype}); expected numbers, "
+                    f"{' or '.join(map(str, fits))}: {len(joints)} joints, a row per instant."
                 )
-            own = {key: values} if values.ndim == 1 else None
-            found |= own or {f"{key}_{j}": x for j, x in zip(joints, values.T, strict=True)}
+            own = {f"{key}_{joint}": x for joint, x in zip(joints, values.T, strict=False)}
+            found |= own if values.ndim == 2 else {key: values}
         yield found
-
-
-def _numbers(key: str, values: Any) -> NDArray[np.float64]:
-    try:
-        return np.asarray(values, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise ConfigError(f"{key} does not hold numbers: {error}. Give an array.") from error
 
 
 def columns_in(frame: Any) -> tuple[Columns, list[str]]:
     """Columns (T,) of a table that hold numbers or dates (s from 1970), and names of others."""
-    listed = frame if isinstance(frame, Mapping) else getattr(frame, "columns", None)
-    listed = getattr(frame, "column_names", listed)  # of Arrow
-    if listed is None:
+    names = frame if isinstance(frame, Mapping) else getattr(frame, "columns", None)
+    if names is None:
         kind = type(frame).__name__
         raise ConfigError(
             f"frame is {kind}. Give a table with columns t, q_<joint>, tau_<joint>, …"
         )
-    columns = {str(name): np.asarray(frame[name]) for name in listed}
+    columns = {str(name): np.asarray(frame[name]) for name in names}
     shapes = {column.shape for column in columns.values()}
     if len(shapes) != 1 or min(map(len, shapes)) != 1 or max(shapes)[0] < 2:
         told = ", ".join(f"{name} {column.shape}" for name, column in columns.items())
@@ -74,14 +64,6 @@ def columns_in(frame: Any) -> tuple[Columns, list[str]]:
         if column.dtype.kind == "M":
             seconds = column.astype("datetime64[us]").astype(np.int64) / 1e6
             found[name] = np.where(np.isnat(column), np.nan, seconds)
-        elif column.dtype.kind in "biuf" or _is_numeric(column):
+        elif column.dtype.kind in "biuf":
             found[name] = column.astype(float)
     return found, [name for name in columns if name not in found]
-
-
-def _is_numeric(column: NDArray[Any]) -> bool:
-    try:
-        column.astype(float)
-    except (TypeError, ValueError):
-        return False
-    return True

@@ -107,12 +107,7 @@ def read_dataset(
     noted: list[list[Finding]] = []
 
     def arranged() -> Iterator[tuple[Path, list[Run]]]:
-        recordings = (
-            _from_python(given, options)
-            if isinstance(given, Dataset)
-            else _recordings(paths, options)
-        )
-        for path, raws in recordings:
+        for path, raws in _recordings(given, options):
             seen.update(name for raw in raws for column in raw.columns.values() for name in column)
             own, noticed = [], []
             for raw in _named(raws, path, taken):
@@ -122,7 +117,7 @@ def read_dataset(
                     spec.torque_names, options.beside,
                 )  # fmt: skip
                 t, epoch = _seconds(raw, spec)
-                origin = Origin(str(path), raw.place) if paths else Origin()
+                origin = Origin(str(path) if paths else "", raw.place)
                 run = replace(run, t=t, epoch=epoch, origin=origin)
                 run = covariates.take(run, raw, spec.names)
                 own.append(to_joints(run, spec, joint_names, turning, motors).kept(spool))
@@ -140,14 +135,6 @@ def read_dataset(
     return Dataset(joint_names, tuple(runs), tuple(map(str, paths)), tuple(findings))
 
 
-def _from_python(data: Dataset, options: ReadOptions) -> Iterator[tuple[Path, list[RawRun]]]:
-    """Runs of arrays as the tables that they would be in files."""
-    place = Path("data from Python")
-    for run in data.runs:
-        raw = run_of_table(place, NamedColumns(run.extra), options)
-        yield from with_joined([(place, [replace(raw, name=run.name)])], options)
-
-
 def _moves_elsewhere(found: Finding, runs: Sequence[Run], joint_names: tuple[str, ...]) -> bool:
     """Whether a joint that one file holds still moves in another: it was held there."""
     if found.kind != "dead" or len(found.joints) != 1:
@@ -156,14 +143,22 @@ def _moves_elsewhere(found: Finding, runs: Sequence[Run], joint_names: tuple[str
     return any(np.ptp(run.q[:, j]) > 0.0 for run in runs)
 
 
-def _recordings(paths: Sequence[Path], options: ReadOptions) -> Iterator[tuple[Path, list[RawRun]]]:
+def _recordings(
+    given: Sequence[Path] | Dataset, options: ReadOptions
+) -> Iterator[tuple[Path, list[RawRun]]]:
     """What the files hold, one after the other; those with some channels of a recording are joined.
 
     Of one recording only: which file belongs to which of several cannot be known. It takes the
     place of the first.
     """
+    if isinstance(given, Dataset):  # as the tables that they would be in files
+        place = Path("data from Python")
+        for run in given.runs:
+            raw = run_of_table(place, NamedColumns(run.extra), options)
+            yield from with_joined([(place, [replace(raw, name=run.name)])], options)
+        return
     later: list[tuple[Path, list[RawRun]]] = []
-    for path in paths:
+    for path in given:
         raws = reader_for(path).read(path, options)
         if later or any(is_part(raw, options) for raw in raws):
             later.append((path, raws))

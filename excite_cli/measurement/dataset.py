@@ -186,13 +186,6 @@ class Dataset(Shown):
         ------
         ConfigError
             Shapes or lengths of lists differ, a name is there twice, or values are no numbers.
-
-        Examples
-        --------
-        >>> t = np.arange(100) / 50.0
-        >>> q = np.sin(np.outer(t, [1.0, 2.0]))
-        >>> Dataset.from_arrays(["hip", "knee"], t, q, 3.0 * q).recordings
-        ('run',)
         """
         given = {"t": t, "q": q, "tau": tau, "dq": dq, **(covariates or {}), **(extra or {})}
         tables = tables_of(joint_names, given, covariates or ())

@@ -89,9 +89,9 @@ def plot_residual(found: Diagnosis | Identification, joint: str | None, ax: Any)
 
 
 @styled
-def plot_friction(clouds: Mapping[str, Cloud], joint: str, ax: Any) -> Any:
+def plot_friction(clouds: Mapping[str, tuple[Cloud, str]], joint: str, ax: Any) -> Any:
     """Of one joint what all else leaves of the torque, its middle 80 %, and the law on top."""
-    return _drawn([cloud_plot(name, cloud) for name, cloud in clouds.items()], joint, ax, 0)
+    return _drawn([cloud_plot(name, own) for name, (own, _) in clouds.items()], joint, ax, 0)
 
 
 @styled

@@ -244,8 +244,8 @@ def _text(text: str) -> str:
     return escape(text).replace("\n", "<br>")
 
 
-# Rows of a table by its name: values by the names of their columns.
-Tables = Mapping[str, Callable[[Any], list[dict[str, Any]]]]
+# What a record offers in Python: rows of tables by their names, and what its `plot…` draw.
+Offers = Mapping[str, Callable[..., Any]]
 _OF_EFFECTS = ("effect", "joints", "parameter", "value", "std", "unit")  # where there are none
 
 
@@ -253,8 +253,7 @@ _OF_EFFECTS = ("effect", "joints", "parameter", "value", "std", "unit")  # where
 class _Shown:
     words: Callable[[Any], str]
     parts: Callable[[Any], Parts]
-    tables: Tables
-    plots: Mapping[str, Callable[..., Any]]
+    offers: Offers
 
 
 _known: dict[type, _Shown] = {}
@@ -280,20 +279,13 @@ class Shown:
 
         `unit` is that of `value`, or of `rms_…`; `error_…`, `share…` and `gain` are shares.
 
-        Raises
-        ------
-        ConfigError
-            The record has no such table.
-        MissingExtraError
-            pandas is not installed.
+        Raises ConfigError where there is no such table, MissingExtraError without pandas.
         """
-        found = _found(type(self))
-        tables = {} if found is None else found.tables
+        tables = {key: rows for key, rows in offered(self).items() if not key.startswith("plot")}
         if name not in tables:
-            own = f"Tables: {', '.join(tables)}." if tables else "It has none."
-            raise ConfigError(
-                f"{type(self).__name__} has no table '{name}'. {own}{nearest(str(name), tables)}"
-            )
+            kind, own = type(self).__name__, ", ".join(tables) or "none"
+            close = nearest(str(name), tables)
+            raise ConfigError(f"{kind} has no table '{name}'. Tables: {own}.{close}")
         try:
             pandas = import_module("pandas")
         except ImportError as error:
@@ -311,22 +303,16 @@ def show(
     kind: type[T],
     words: Callable[[T], str],
     parts: Callable[[T], Parts],
-    tables: Tables = MappingProxyType({}),
-    **plots: Callable[..., Any],
+    offers: Offers = MappingProxyType({}),
 ) -> None:
-    """State how records of `kind` are shown: in words (inside brackets), as tables, as numbers.
-
-    `plots` are what their methods of that name draw.
-    """
-    _known[kind] = _Shown(words, parts, tables, plots)
+    """State how records of `kind` are shown: in words (inside brackets), as tables, in Python."""
+    _known[kind] = _Shown(words, parts, offers)
 
 
-def drawn(record: Shown, name: str, *args: Any) -> Any:
-    """What the plot of this name draws of the record."""
+def offered(record: Shown) -> Offers:
+    """What the record offers in Python."""
     found = _found(type(record))
-    if found is None:
-        raise ConfigError(f"{type(record).__name__}: plots are of records that a function gave.")
-    return found.plots[name](record, *args)
+    return {} if found is None else found.offers
 
 
 def _found(kind: type) -> _Shown | None:

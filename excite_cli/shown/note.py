@@ -54,10 +54,9 @@ class _Readable:
         return self.__wrapped__(*args, **kwargs)  # type: ignore[attr-defined]
 
     def __repr__(self) -> str:
-        return str(self.__name__)  # type: ignore[attr-defined]
-
-    def __reduce__(self) -> str:  # as functions: by name
         return str(self.__qualname__)  # type: ignore[attr-defined]
+
+    __reduce__ = __repr__  # kept by name, as functions are
 
 
 def readable(function: F) -> F:
@@ -71,7 +70,7 @@ def unheard(*told: object) -> None:
 
 
 @readable
-def never() -> bool:
+def never(*asked: object) -> bool:
     """Say no, whenever it is asked."""
     return False
 

@@ -21,7 +21,6 @@ from excite_cli.diagnosis.words import (
     value_in_words,
 )
 from excite_cli.fields import data_of, public_data
-from excite_cli.report.record_plots import plot_friction, plot_residual
 from excite_cli.report.residual_chart import dependence_plots, residuals_in_time
 from excite_cli.shown.answer import (
     Answer,
@@ -40,7 +39,7 @@ from excite_cli.shown.answer import (
     show,
 )
 from excite_cli.summary.cells import files_in_words
-from excite_cli.summary.effect_evidence import evidence_section, friction_clouds
+from excite_cli.summary.effect_evidence import evidence_section
 from excite_cli.summary.error_by_joint import errors_section
 from excite_cli.summary.findings import data_blocks
 from excite_cli.summary.frames import OF_DIAGNOSIS
@@ -357,16 +356,7 @@ def _named_in_words(named: NamedEffect) -> str:
     return f"{what_and_where(named.effect, 0)}: {', '.join(sizes)}"
 
 
-show(
-    Diagnosis,
-    _in_words,
-    diagnosis_parts,
-    OF_DIAGNOSIS,
-    plot_residual=plot_residual,
-    plot_friction=lambda found, *of: plot_friction(
-        {joint: each[0] for joint, each in friction_clouds(found, found.traces).items()}, *of
-    ),
-)
+show(Diagnosis, _in_words, diagnosis_parts, OF_DIAGNOSIS)
 show(
     NamedEffect,
     _named_in_words,

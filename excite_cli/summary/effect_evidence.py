@@ -128,24 +128,22 @@ def _over_speed(trace: EffectTrace) -> bool:
 
 def friction_plots(found: Diagnosis, traces: Traces) -> tuple[Plot, ...]:
     """For each joint with several effects over its speed: all of them at once."""
-    return tuple(
-        cloud_plot(f"Friction of {joint}", cloud, f"{', '.join(trace.kind for trace in parts)}.")
-        for joint, (cloud, parts) in friction_clouds(found, traces).items()
-        if len(parts) > 1
-    )
+    clouds = friction_clouds(found, traces, fewest=2)
+    return tuple(cloud_plot(f"Friction of {joint}", *both) for joint, both in clouds.items())
 
 
 def friction_clouds(
-    found: Diagnosis, traces: Traces | None
-) -> dict[str, tuple[Cloud, list[EffectTrace]]]:
-    """By the joint, effects over its speed as one; of those with different samples the first."""
+    found: Diagnosis, traces: Traces | None, fewest: int = 1
+) -> dict[str, tuple[Cloud, str]]:
+    """By the joint, `fewest` or more effects over its speed as one, and their kinds."""
     clouds = {}
     for joint, unit in zip(found.joint_names, found.torque_units, strict=True):
         every = traces.effects if traces else ()
         parts = [t for t in every if _over_speed(t) and t.rows == (joint,) and not t.runs]
-        if parts and np.isfinite(parts[0].partial).any():
-            parts = parts if _same_samples(parts) else parts[:1]
-            clouds[joint] = together([cloud_of(trace, 0, unit) for trace in parts]), parts
+        parts = parts if parts and _same_samples(parts) else parts[:1]
+        if len(parts) >= fewest and np.isfinite(parts[0].partial).any():
+            own = together([cloud_of(trace, 0, unit) for trace in parts])
+            clouds[joint] = own, f"{', '.join(trace.kind for trace in parts)}."
     return clouds
 
 

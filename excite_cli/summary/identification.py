@@ -22,7 +22,6 @@ from excite_cli.identification.identify import Identification
 from excite_cli.identification.link_changes import LinkChange
 from excite_cli.identification.stored_model import StoredFit
 from excite_cli.report.error_chart import NOTHING_MOVES, error_charts, parameter_charts
-from excite_cli.report.record_plots import plot_residual
 from excite_cli.report.residual_chart import residuals_in_time
 from excite_cli.shown.answer import (
     Answer,
@@ -44,7 +43,7 @@ from excite_cli.summary.cells import (
     percent,
 )
 from excite_cli.summary.findings import data_blocks
-from excite_cli.summary.frames import OF_FIT, OF_IDENTIFICATION
+from excite_cli.summary.frames import OF_FIT, OF_IDENTIFICATION, parameters_of
 
 _CORRELATED, _MOST_PAIRS = 0.95, 15
 
@@ -193,13 +192,10 @@ def _error_table(found: Identification | StoredFit) -> Table:
 def _data(found: Identification) -> dict[str, Any]:
     """The answer for `--json`."""
     fit, bias = found.fit, found.hausman
-    columns = ("values", "std", "relative_std", "identifiable", "essential", "units")
-    keys = ("name", "value", *columns[1:-1], "unit")
-    table = zip(fit.names, *(data_of(getattr(fit, name)) for name in columns), strict=True)
     consistent = fit.consistent
     return {
         **data_of(found, "held_out_run", "error", "training_error", "noise_floor"),
-        "parameters": [dict(zip(keys, row, strict=True)) for row in table],
+        "parameters": parameters_of(fit),
         "effects": [
             {
                 "kind": effect.kind,
@@ -370,13 +366,7 @@ def correlated_parameters(fit: Fit) -> tuple[Block, ...]:
 
 
 show(Fit, _fit_in_words, lambda fit: [_parameter_table(fit)], OF_FIT)
-show(
-    Identification,
-    _in_words,
-    identification_parts,
-    OF_IDENTIFICATION,
-    plot_residual=plot_residual,
-)
+show(Identification, _in_words, identification_parts, OF_IDENTIFICATION)
 show(StoredFit, _in_words, _stored_parts, OF_IDENTIFICATION)
 
 

@@ -269,7 +269,7 @@ def _segment_in_words(segment: Segment) -> str:
     return f"{segment.name}: {joints} joints, {segment.trajectory.duration:.4g} s"
 
 
-show(Result, _in_words, result_parts, plot=plot_motion)
+show(Result, _in_words, result_parts, {"plot": plot_motion})
 show(Motion, motion_sentence, lambda motion: _tables([motion]))
 show(Segment, _segment_in_words, lambda segment: [_segment_in_words(segment)])
 show(

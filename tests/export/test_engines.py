@@ -101,11 +101,6 @@ def test_pinocchio_says_what_its_inverse_dynamics_lacks(robot: Robot) -> None:
     assert note.level is Level.WARNING
     assert all(f"{kind} at " in note.text for kind in (*HELD[:2], "spring"))
     assert "armature" not in note.text
-    at = [engine.joints[j].idx_v for j in robot.model_joints]
-    viscous, dry = ([x[0] for e, x in own.by_effect if e.kind == kind] for kind in HELD[:2])
-    np.testing.assert_array_equal(engine.damping[at], viscous)
-    np.testing.assert_array_equal(engine.upperDryFrictionLimit[at], dry)
-    np.testing.assert_array_equal(engine.lowerDryFrictionLimit[at], np.negative(dry))
 
 
 def test_mujoco_holds_rotors_and_straight_friction(robot: Robot) -> None:

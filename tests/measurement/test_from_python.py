@@ -122,15 +122,14 @@ Q, TAU = RUN.q, RUN.tau
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: Dataset.from_arrays(JOINTS, T, Q.T, TAU), r"q has shape \(3, 1600\); expected"
-         r" \(1600, 3\): 1600 instants, 3 joints"),
+        (lambda: Dataset.from_arrays(JOINTS, T, Q.T, TAU), r"q has shape \(3, 1600\)"),
         (lambda: Dataset.from_arrays(JOINTS, T, Q, TAU[:9]), r"tau has shape \(9, 3\)"),
         (lambda: Dataset.from_arrays(JOINTS, Q, Q, TAU), r"t has shape \(1600, 3\)"),
         (lambda: Dataset.from_arrays(JOINTS, 3.0, Q, TAU), r"t has shape \(\)"),
         (lambda: Dataset.from_arrays(JOINTS[:2], T, Q, TAU), r"2 joints, a row per instant"),
         (lambda: Dataset.from_arrays("arm", T, Q, TAU), "joint_names is 'arm'"),
         (lambda: Dataset.from_arrays(["a", "a", "b"], T, Q, TAU), "list of different names"),
-        (lambda: Dataset.from_arrays(JOINTS, T, Q, [["x"]]), "tau does not hold numbers"),
+        (lambda: Dataset.from_arrays(JOINTS, T, Q, [["x"]]), "expected numbers"),
         (lambda: Dataset.from_arrays(JOINTS, [T, T], [Q], [TAU, TAU]), "q: give a list of 2 arr"),
         (lambda: Dataset.from_arrays(JOINTS, [T], [Q], [TAU], names=["a", "b"]), "each of 1 reco"),
         (lambda: Dataset.from_arrays(JOINTS, [T, T], [Q, Q], names=["a", "a"]), "one of its own"),

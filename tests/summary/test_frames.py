@@ -28,7 +28,7 @@ def test_parameters_are_those_of_the_fit(fitted: Identification) -> None:
     fit, table = fitted.fit, fitted.table("parameters")
     assert isinstance(table, pd.DataFrame)
     pd.testing.assert_frame_equal(table, fit.table("parameters"))
-    assert tuple(table["parameter"]) == fit.names
+    assert tuple(table["name"]) == fit.names
     assert tuple(table["unit"]) == fit.units
     for name in ("value", "std", "relative_std"):
         column = {"value": "values"}.get(name, name)
@@ -70,7 +70,7 @@ def test_effects_have_a_row_for_every_number(found: Diagnosis) -> None:
     assert {*replace(found, effects=()).table("effects")} < {*table}
     inertias = found.table("parameters")
     np.testing.assert_array_equal(inertias["value"], found.phi)
-    assert tuple(inertias["parameter"]) == found.inertia_names
+    assert tuple(inertias["name"]) == found.inertia_names
     assert inertias["unit"][0] == "kg"
 
 
