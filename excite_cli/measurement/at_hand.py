@@ -49,6 +49,7 @@ def tables_of(
 def columns_in(frame: Any) -> tuple[Columns, list[str]]:
     """Columns (T,) of a table that hold numbers or dates (s from 1970), and names of others."""
     names = frame if isinstance(frame, Mapping) else getattr(frame, "columns", None)
+    names = frame.column_names if hasattr(type(frame), "column_names") else names  # of Arrow
     if names is None:
         kind = type(frame).__name__
         raise ConfigError(

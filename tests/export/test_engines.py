@@ -18,6 +18,8 @@ from excite_cli.identification.stored_model import StoredModel
 from excite_cli.robot.model import Array, Robot
 from excite_cli.shown.note import Level, Note
 from excite_cli.simulation.build import true_inertias
+from tests.api.conftest import Loop
+from tests.api.conftest import loop as loop
 from tests.robot.coupled_robots import HAND, coupled_robot
 from tests.robot.random_robots import random_robot
 
@@ -115,6 +117,14 @@ def test_mujoco_says_what_it_lacks() -> None:
     heard: list[Note] = []
     model_of(random_robot(3, joints=3), "torque_gain").to_mjmodel(heard.append)
     assert any("torque_gain" in n.text and n.level is Level.WARNING for n in heard)
+
+
+def test_engines_have_the_consistent_bodies_of_a_fit(loop: Loop) -> None:
+    model = Model.load(loop.fit).consistent
+    robot, x = model.made.robot, states(model.made.robot)
+    for found in (by_pinocchio(robot, model.pinocchio(), *x),
+                  by_mujoco(robot, model.to_mjmodel(), *x)):  # fmt: skip
+        assert np.abs(found - model.torque(*x)).max() < 1e-9
 
 
 def test_without_mujoco_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pytest
 
 from excite_cli.config.data_spec import MeasurementSpec
@@ -59,7 +60,7 @@ def test_they_are_what_a_csv_of_them_is(run: Run, declared: dict, tmp_path: Path
     table = columns_of(run)
     of_file = read_dataset([write_table(tmp_path / "run.csv", table)], spec, JOINTS, BOUNDS)
     arrays = Dataset.from_arrays(JOINTS, run.t, run.q, run.tau, dq=run.dq)
-    frames: list[Any] = [pd.DataFrame(table), table]
+    frames: list[Any] = [pd.DataFrame(table), table, pa.table(table)]
     for given in (arrays, *map(Dataset.from_frame, frames)):
         assert given.as_given
         same(of_file, read_dataset(given, spec, JOINTS, BOUNDS))
