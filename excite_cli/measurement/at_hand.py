@@ -26,12 +26,13 @@ def tables_of(
     if isinstance(joints, str) or len({*joints}) != len(joints):
         raise ConfigError(f"joint_names is {joints!r}. Give a list of different names.")
     several = isinstance(given["t"], list | tuple) and any(np.ndim(each) for each in given["t"])
-    lists = {key: x if several else [x] for key, x in given.items() if x is not None}
+    needed = {key: x for key, x in given.items() if x is not None or key in ("t", "q")}
+    lists = {key: x if several else [x] for key, x in needed.items()}
     for key, x in lists.items():
         if not isinstance(x, list | tuple) or len(x) != len(lists["t"]):
             raise ConfigError(f"{key}: give a list of {len(lists['t'])} arrays, as t is one.")
     for k, t in enumerate(lists["t"]):
-        count, found = np.size(t), Columns()
+        count, found = len(np.atleast_1d(t)), Columns()
         for key, x in lists.items():
             values = np.asarray(x[k])
             wide = [(count, len(joints))] * (key not in ("t", *single))
@@ -67,4 +68,6 @@ def columns_in(frame: Any) -> tuple[Columns, list[str]]:
             found[name] = np.where(np.isnat(column), np.nan, seconds)
         elif column.dtype.kind in "biuf":
             found[name] = column.astype(float)
+    if not found:
+        raise ConfigError(f"no column holds numbers: {', '.join(columns)}. Give t, q_<joint>, …")
     return found, [name for name in columns if name not in found]

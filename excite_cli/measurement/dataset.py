@@ -187,7 +187,7 @@ class Dataset(Shown):
         ConfigError
             Shapes or lengths of lists differ, a name is there twice, or values are no numbers.
         """
-        given = {"t": t, "q": q, "tau": tau, "dq": dq, **(covariates or {}), **(extra or {})}
+        given = {**(covariates or {}), **(extra or {}), "t": t, "q": q, "tau": tau, "dq": dq}
         tables = tables_of(joint_names, given, covariates or ())
         return replace(cls.from_frame([*tables], names=names), joint_names=tuple(joint_names))
 

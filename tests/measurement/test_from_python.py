@@ -138,6 +138,8 @@ Q, TAU = RUN.q, RUN.tau
         (lambda: Dataset.from_arrays(JOINTS, T, Q, TAU, extra={"w": Q[:, :2]}), r"w has shape"),
         (lambda: Dataset.from_arrays(JOINTS, T[:1], Q[:1], TAU[:1]), r"t \(1,\)"),
         (lambda: Dataset.from_arrays(JOINTS, T[:0], Q[:0], TAU[:0]), r"t \(0,\)"),
+        (lambda: Dataset.from_arrays(JOINTS, None, Q, TAU), r"t has shape \(\)"),  # type: ignore[arg-type]
+        (lambda: Dataset.from_frame({"who": ["a", "b"]}), "no column holds numbers: who"),
         (lambda: Dataset.from_frame(3), "frame is int"),
         (lambda: Dataset.from_frame([]), "each of 0 recordings"),
         (lambda: Dataset.from_frame({"t": T, "q_a": T[:5]}), r"q_a \(5,\)\. Give a value"),
