@@ -62,12 +62,14 @@ if TYPE_CHECKING:
     from excite_cli.diagnosis.next_motion import NextMotion as NextMotion
     from excite_cli.diagnosis.records import Diagnosis as Diagnosis
     from excite_cli.diagnosis.records import NamedEffect as NamedEffect
+    from excite_cli.effects.base import Effect as Effect
     from excite_cli.errors import ConfigError as ConfigError
     from excite_cli.errors import ExciteError as ExciteError
     from excite_cli.errors import FileError as FileError
     from excite_cli.errors import MissingExtraError as MissingExtraError
     from excite_cli.errors import NoAdmissibleMotionError as NoAdmissibleMotionError
     from excite_cli.errors import RobotError as RobotError
+    from excite_cli.excitation.gradient_check import GradientCheck as GradientCheck
     from excite_cli.excitation.inspection import Inspection as Inspection
     from excite_cli.excitation.inspection import Inspections as Inspections
     from excite_cli.excitation.motion import Motion as Motion
@@ -77,9 +79,11 @@ if TYPE_CHECKING:
     from excite_cli.identification.carried_load import LoadIdentification as LoadIdentification
     from excite_cli.identification.fit import Fit as Fit
     from excite_cli.identification.identify import Identification as Identification
+    from excite_cli.identification.stored_model import StoredFit as StoredFit
     from excite_cli.measurement.dataset import Dataset as Dataset
     from excite_cli.measurement.dataset import Run as Run
     from excite_cli.proposal.propose import Proposal as Proposal
+    from excite_cli.robot.overview import DescribedRobot as DescribedRobot
     from excite_cli.scoring.changes import Change as Change
     from excite_cli.scoring.changes import Changes as Changes
     from excite_cli.scoring.records import Replay as Replay
@@ -87,10 +91,12 @@ if TYPE_CHECKING:
     from excite_cli.scoring.records import ScoredRun as ScoredRun
     from excite_cli.scoring.records import SetPointReplay as SetPointReplay
     from excite_cli.scoring.thresholds import Thresholds as Thresholds
+    from excite_cli.shown.answer import Answer as Answer
     from excite_cli.shown.note import Level as Level
     from excite_cli.shown.note import Note as Note
     from excite_cli.simulation.settings import SimulationSettings as SimulationSettings
     from excite_cli.simulation.simulate import Simulation as Simulation
+    from excite_cli.study.records import CaseRecord as CaseRecord
     from excite_cli.trajectory.fade import Segment as Segment
     from excite_cli.workers.base import Workers as Workers
     from excite_cli.workers.context import open_workers as open_workers
@@ -132,6 +138,12 @@ _HOMES = {
     "config.spec": ("Spec",),
     "diagnosis.next_motion": ("NextMotion",),
     "diagnosis.records": ("Diagnosis", "NamedEffect"),
+    "effects.base": ("Effect",),
+    "excitation.gradient_check": ("GradientCheck",),
+    "identification.stored_model": ("StoredFit",),
+    "robot.overview": ("DescribedRobot",),
+    "shown.answer": ("Answer",),
+    "study.records": ("CaseRecord",),
     "errors": (
         "ConfigError",
         "ExciteError",

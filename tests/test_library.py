@@ -2,10 +2,15 @@
 
 import ast
 import doctest
+import inspect
+import pickle
+import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
+from typing import Any, get_args, get_type_hints
 
 import numpy as np
 import pytest
@@ -24,6 +29,7 @@ from excite_cli import (
     propose,
     read_result,
 )
+from excite_cli.shown.note import log_note
 
 ROOT = Path(__file__).resolve().parents[1]
 SMOKE = ROOT / "configs" / "smoke.yaml"
@@ -63,6 +69,49 @@ def test_types_are_those_of_the_names() -> None:
             assert alias.asname == alias.name  # else type checkers take it for private
             seen[alias.name] = node.module
     assert seen == {name: f"excite_cli.{home}" for name, home in excite_cli._HOME.items()}
+
+
+def test_signatures_can_be_read() -> None:
+    """Defaults are shown by name, not by the place in memory where they are."""
+    for name in excite_cli.__all__:
+        found = getattr(excite_cli, name)
+        own = [found] if callable(found) else []
+        if inspect.isclass(found):
+            own += [each for key, each in vars(found).items() if not key.startswith("_")]
+        for each in own:
+            if (callable(each) and not isinstance(each, type)) or each is found:
+                try:
+                    told = str(inspect.signature(each))
+                except ValueError:
+                    continue  # of errors, written in C
+                assert not re.search("<function|<object|<lambda| at 0x", told), (name, told)
+    assert "tell: " in str(inspect.signature(excite_cli.diagnose))
+    assert "= log_note" in str(inspect.signature(excite_cli.diagnose))
+    assert pickle.loads(pickle.dumps(log_note)) is log_note
+
+
+def in_hint(hint: Any) -> Iterator[type]:
+    inner = get_args(hint)
+    if not inner and isinstance(hint, type):
+        yield hint
+    for each in inner:
+        yield from in_hint(each)
+
+
+def test_what_functions_return_can_be_imported_beside_them() -> None:
+    public = [getattr(excite_cli, name) for name in excite_cli.__all__]
+    functions = [each for each in public if inspect.isfunction(each)]
+    for kind in (excite_cli.Model, excite_cli.Dataset):
+        own = [each for name, each in vars(kind).items() if not name.startswith("_")]
+        members = (getattr(each, "fget", getattr(each, "__func__", each)) for each in own)
+        functions += [each for each in members if inspect.isfunction(each)]
+    seen = 0
+    for function in functions:
+        for kind in in_hint(get_type_hints(function).get("return")):
+            if kind.__module__.startswith("excite_cli."):
+                assert kind in public, (function.__qualname__, kind)
+                seen += 1
+    assert seen > 30
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:
@@ -111,7 +160,8 @@ def test_a_proposal_can_be_loaded(tmp_path: Path) -> None:
 def test_examples_in_docstrings_are_right(monkeypatch: pytest.MonkeyPatch) -> None:
     """They are run where the repository is."""
     monkeypatch.chdir(ROOT)
-    modules = {home for home in excite_cli._HOME.values() if home.startswith("api.")}
+    homes = {*excite_cli._HOME.values()}
+    modules = {home for home in homes if home.startswith(("api.", "measurement."))}
     found = [doctest.testmod(import_module(f"excite_cli.{home}")) for home in sorted(modules)]
     assert sum(each.attempted for each in found) >= 5
     assert not sum(each.failed for each in found)

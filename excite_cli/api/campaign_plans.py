@@ -32,7 +32,7 @@ from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.robot.model import Array, Robot
-from excite_cli.shown.note import Level, Note, Tell
+from excite_cli.shown.note import Level, Note, Tell, unheard
 from excite_cli.store.diagnosis_file import read_diagnosis
 from excite_cli.store.result_file import read_result
 from excite_cli.summary.motions import motion_sentence
@@ -104,7 +104,7 @@ class RoundPlans:
     def _allowed(self, planned: CampaignRound, number: int) -> bool:
         """Whether the model of the round before keeps the limits of torque in these motions."""
         path = self.folder / diagnosis_of(number - 1)
-        known = plan_after(self.case, path, tell=lambda note: None).known
+        known = plan_after(self.case, path, tell=unheard).known
         motions = [
             motion
             for each in planned.motions
@@ -119,7 +119,7 @@ class RoundPlans:
         known, unseen = self._effects(found)
         alone = state.asked.plain or not unseen
         case = replace(self.case, spec=_of(spec, number, 2 if alone else 1))
-        following = plan_after(case, found, tell=lambda note: None)
+        following = plan_after(case, found, tell=unheard)
         self._say(f"round {number}: {following.messages[0]}")
         path = self.folder / f"{name}.h5"
         result = self._planned(following, path)
@@ -157,7 +157,7 @@ class RoundPlans:
         return here, unseen
 
     def _problem(self, spec: Spec, number: int, motions: int) -> Problem:
-        return problem_of(replace(self.case, spec=_of(spec, number, motions)), lambda note: None)
+        return problem_of(replace(self.case, spec=_of(spec, number, motions)), unheard)
 
     def _planned(self, problem: Planned, path: Path, logs: Sequence[Path] = ()) -> Result:
         found = plan(
@@ -203,7 +203,7 @@ class RoundPlans:
         path = (self.folder / f"round_{state.rounds[-1].number}_fit.h5").resolve()
         logs = [self.folder / each.data for each in state.motions]
         model = load_case(self.folder / MODEL)
-        identify(model, logs, output=path, overwrite=True, tell=lambda note: None)
+        identify(model, logs, output=path, overwrite=True, tell=unheard)
         known = spec.uncertainty.model_copy(update={"fit": str(path)})
         return spec.model_copy(update={"uncertainty": known})
 

@@ -40,7 +40,7 @@ from excite_cli.errors import ConfigError, FileError
 from excite_cli.excitation.invariant import invariants
 from excite_cli.measurement.torque import given_law
 from excite_cli.report.page import render
-from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.shown.note import Level, Note, Tell, log_note, unheard
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.store.own_file import versions
 from excite_cli.summary.campaign import campaign_answer as campaign_answer
@@ -91,7 +91,7 @@ def run_campaign(
     retries: int = 2,
     resume: bool = False,
     workers: Workers | None = None,
-    progress: PlanProgress = lambda motion, progress: None,
+    progress: PlanProgress = unheard,
     tell: Tell = log_note,
 ) -> Campaign:
     """Rounds of motions, measured by `measure`, until nothing that matters is left.
@@ -229,7 +229,7 @@ class _Loop:
             tell=warnings_only(self.tell),
         )
         save_config(self.folder / MODEL, self.case, found, unconfirmed=True)
-        following = plan_after(self.case, found, tell=lambda note: None)
+        following = plan_after(self.case, found, tell=unheard)
         separation = following.problem.separation
         pairs = (
             ()

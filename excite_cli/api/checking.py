@@ -23,7 +23,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.proof.certificate import Path as MotionPath
 from excite_cli.robot.model import Array
-from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.shown.note import Level, Note, Tell, log_note, unheard
 from excite_cli.store.result_file import is_result, read_result, read_samples
 from excite_cli.summary.inspections import check_answer as check_answer
 from excite_cli.trajectory.fade import Segment
@@ -40,7 +40,7 @@ def check(
     random: int = 0,
     meshes: bool = True,
     slow: float | None = None,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    progress: Callable[[int, int], None] = unheard,
     tell: Tell = log_note,
 ) -> Inspections:
     """Every motion against every constraint, proved where it can be: `excite check`.

@@ -14,6 +14,7 @@ from excite_cli.excitation.motion import Doubt
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import random_baseline
 from excite_cli.excitation.result import Comparison, Result, matches
+from excite_cli.shown.note import unheard
 from excite_cli.store.result_file import read_result, write_result
 from excite_cli.summary.motions import comparison_answer as comparison_answer
 from excite_cli.summary.pairs import doubts_in_words
@@ -58,7 +59,7 @@ def compare_random(
     seconds: float | None = None,
     output: str | Path | None = None,
     overwrite: bool = False,
-    drawn: Callable[[int, float], None] = lambda count, best: None,
+    drawn: Callable[[int, float], None] = unheard,
     workers: Workers | None = None,
 ) -> Comparison:
     """Random motions under the same constraints, as many as the optimised ones, the best of many.
@@ -77,7 +78,7 @@ def compare_random(
     """
     with held({"output": output}, overwrite, inputs_of(problem, optimized)):
         if optimized is None:
-            result = plan(problem, workers=workers, tell=lambda note: None)
+            result = plan(problem, workers=workers, tell=unheard)
         else:
             result = optimized_for(problem, optimized)
         baseline = random_baseline(

@@ -26,7 +26,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.export.parameters import found_config
 from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.measurement.dataset import Dataset
-from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.shown.note import Level, Note, Tell, log_note, never, unheard
 from excite_cli.store.diagnosis_file import write_diagnosis
 from excite_cli.store.own_file import versions
 from excite_cli.summary.diagnosis import diagnosis_answer as diagnosis_answer
@@ -51,9 +51,9 @@ def diagnose(
     apply_unconfirmed: bool = False,
     overwrite: bool = False,
     workers: Workers | None = None,
-    progress: Callable[[str, int], None] = lambda text, done: None,
+    progress: Callable[[str, int], None] = unheard,
     tell: Tell = log_note,
-    ended: Callable[[], bool] = lambda: False,
+    ended: Callable[[], bool] = never,
 ) -> Diagnosis:
     """What the declared model lacks: `excite diagnose`.
 

@@ -96,7 +96,10 @@ def write_dataset(path: str | Path, dataset: Dataset, attributes: Mapping[str, A
     Raises
     ------
     FileError
-        It cannot be written, or is one of the files that the data were read from.
+        It cannot be written, or is one of the files that the data were read from; no config has
+        read the data yet.
     """
+    if dataset.as_given:
+        raise FileError("No config has read these data yet. Do so: load_data(problem, data).")
     refuse_inputs_as_outputs({"path": Path(path)}, dataset.sources)
     hdf5_writer.write_dataset(Path(path), dataset, attributes)

@@ -28,7 +28,7 @@ from excite_cli.identification.identify import Identification
 from excite_cli.identification.identify import identify as identify_dataset
 from excite_cli.identification.stored_model import StoredFit
 from excite_cli.measurement.dataset import Dataset
-from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.shown.note import Level, Note, Tell, log_note, unheard
 from excite_cli.store.fit_file import read_fit, write_fit
 from excite_cli.summary.identification import identification_answer as identification_answer
 from excite_cli.summary.identification import load_answer as load_answer
@@ -48,7 +48,7 @@ def identify(
     parameters: str | Path | None = None,
     overwrite: bool = False,
     workers: Workers | None = None,
-    progress: Callable[[str, int], None] = lambda text, done: None,
+    progress: Callable[[str, int], None] = unheard,
     tell: Tell = log_note,
 ) -> Identification:
     """The parameters of the declared model: `excite identify`.

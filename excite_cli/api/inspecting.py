@@ -35,7 +35,7 @@ from excite_cli.config.plain_yaml import yaml_text
 from excite_cli.config.trajectory_spec import TaskSpec
 from excite_cli.diagnosis.measured_prior import measured_stack
 from excite_cli.diagnosis.power import EffectPower, sizes_shown
-from excite_cli.errors import ExciteError
+from excite_cli.errors import ConfigError, ExciteError
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing
@@ -77,7 +77,7 @@ show(LogInspection, headline, inspection_parts)
 @checked()
 def inspect(
     problem: Problem | Case,
-    data: str | Path | Sequence[str | Path] = (),
+    data: Dataset | str | Path | Sequence[str | Path] = (),
     *,
     apply: str | Path | None = None,
     output: str | Path | None = None,
@@ -87,7 +87,8 @@ def inspect(
 ) -> LogInspection:
     """Mistakes of set-up in log and model: `excite inspect`.
 
-    Without `data` the description alone is judged. What would settle what is seen in the files is
+    `data` are files, or arrays (`Dataset.from_arrays`); without them the description alone is
+    judged. What would settle what is seen in the files is
     tried, and the data are looked at once more with it, before the dynamics are. With `apply` the
     config that says so is written, its comments kept; where nothing is to be changed, as it is.
     `output`: a page (HTML) of all checks; `power`: also the sizes of effects that a diagnosis of
@@ -101,13 +102,19 @@ def inspect(
     Raises
     ------
     ConfigError, FileError
-        A file cannot be read at all; `output` is no name of a page; a file exists already.
+        Data cannot be read at all, or were converted before; `output` is no name of a page; a
+        file exists already.
     """
     problem = measured_case(problem)
     case = Case(problem.spec, problem.folder, problem.robot, problem.file)
-    files = [data] if isinstance(data, str | Path) else list(data)
+    files = [data] if isinstance(data, str | Path) else data
+    if isinstance(data, Dataset) and not data.as_given:
+        raise ConfigError(
+            "inspect: data were converted already. Give the files, or the arrays as recorded: "
+            "Dataset.from_arrays."
+        )
     page = None if output is None else page_path(output)
-    with held({"apply": apply, "output": page}, overwrite, inputs_of(problem, *files)):
+    with held({"apply": apply, "output": page}, overwrite, inputs_of(problem, files)):
         check_names(case.spec, row_names())
         found = but_trusted(rows_of_description(case.robot, case.spec), case.spec)
         settings: dict[str, Any] = {}

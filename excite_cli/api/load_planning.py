@@ -20,7 +20,7 @@ from excite_cli.identification.carried_load import ExpectedLoad, expected_load, 
 from excite_cli.identification.stored_model import StoredFit
 from excite_cli.robot.link_frame import carrying_frame
 from excite_cli.shown.answer import Shown, show
-from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.shown.note import Level, Note, Tell, log_note, unheard
 from excite_cli.store.fit_file import read_fit
 from excite_cli.summary.problem import problem_parts
 
@@ -88,9 +88,9 @@ def plan_load(
     refused: NoAdmissibleMotionError | None = None
     for duration in seconds:
         spec = _spec(case.spec, stored, link, duration)
-        problem = problem_of(replace(own, spec=spec), lambda note: None)
+        problem = problem_of(replace(own, spec=spec), unheard)
         try:
-            result = plan(problem, tell=lambda note: None)
+            result = plan(problem, tell=unheard)
         except NoAdmissibleMotionError as error:
             refused = error
             continue

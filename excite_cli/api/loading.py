@@ -261,12 +261,13 @@ def _doubt_fit(path: Path, tell: Tell) -> None:
 @checked()
 def load_data(
     problem: Problem | Case,
-    files: str | Path | Sequence[str | Path],
+    files: Dataset | str | Path | Sequence[str | Path],
     tell: Tell = log_note,
 ) -> Dataset:
     """Measured data of the robot, converted as `measurement` of the config says, and checked.
 
-    Files are HDF5, CSV, MATLAB's, parquet or bags. Runs have t (T,) in s, q (T, n) in rad (m), tau
+    Files are HDF5, CSV, MATLAB's, parquet or bags; `Dataset.from_arrays` and `from_frame` take
+    what is at hand in Python. Runs have t (T,) in s, q (T, n) in rad (m), tau
     (T, n) in N·m (N); `findings` tell what was noticed (gaps, jitter, dead channels …), and so does
     `tell`.
 
@@ -277,6 +278,8 @@ def load_data(
     ConfigError, MissingExtraError
         The config names what the file lacks; the library for bags is not installed.
     """
+    if isinstance(files, Dataset) and not files.as_given:
+        return dataset_of(problem, files, tell)
     problem = measured_case(problem)
     robot = problem.robot
     data = as_recorded(problem, files)
@@ -292,17 +295,22 @@ def load_data(
     return data
 
 
-def as_recorded(problem: Problem | Case, files: str | Path | Sequence[str | Path]) -> Dataset:
-    """What the files hold, converted and checked, with findings that forbid its use, too.
+def as_recorded(
+    problem: Problem | Case, files: Dataset | str | Path | Sequence[str | Path]
+) -> Dataset:
+    """What files or given data hold, converted and checked; findings that forbid its use, too.
 
     Raises
     ------
     FileError, ConfigError, MissingExtraError
         As `load_data`, but for what its checks find.
     """
-    paths = [files] if isinstance(files, str | Path) else files
-    given = [Path(each) for each in paths]
-    refuse_twice(given)  # a run that is fitted must not be the held-out one, too
+    given: Dataset | list[Path]
+    if isinstance(files, Dataset):
+        given = files
+    else:
+        given = [Path(each) for each in ([files] if isinstance(files, str | Path) else files)]
+        refuse_twice(given)  # a run that is fitted must not be the held-out one, too
     robot, limits, spec = problem.robot, problem.robot.limits, problem.spec.measurement
     own = slice(robot.base_joints, None)
     return read_dataset(
@@ -364,7 +372,7 @@ def dataset_of(
     FileError, ConfigError, MissingExtraError
         The data are of other joints, or lack a declared column; see `load_data`.
     """
-    if not isinstance(data, Dataset):
+    if not isinstance(data, Dataset) or data.as_given:
         return load_data(problem, data, tell)
     problem = measured_case(problem)
     joints, base = problem.robot.joint_names, problem.robot.base_joints

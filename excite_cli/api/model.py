@@ -1,21 +1,29 @@
 """An identified model in use: the torque that it predicts, its friction, its slopes."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from excite_cli.api.arguments import checked
+from excite_cli.api.model_exports import for_simulators
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.errors import ConfigError
+from excite_cli.export.drive import drive_of
+from excite_cli.export.engines import pinocchio_model
+from excite_cli.export.exported import in_words
+from excite_cli.export.mjcf import held_by_actuators, joint_parts, mjcf
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.regression import Series
 from excite_cli.identification.stored_model import StoredModel
 from excite_cli.robot.model import Array
 from excite_cli.shown.answer import Shown, show
-from excite_cli.store.model_file import read_model
+from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.simulation.mujoco_model import load_mujoco, silent_engine
+from excite_cli.store.model_file import consistent_model, read_model
 
 
 @dataclass(frozen=True, repr=False)
@@ -61,6 +69,45 @@ class Model(Shown):
     def left_out(self) -> tuple[Effect, ...]:
         """Effects of single recordings."""
         return self.made.model.of_single_runs
+
+    @property
+    def consistent(self) -> "Model":
+        """The same of bodies that can be, which engines ask for."""
+        found = consistent_model(self.made)
+        return Model(replace(self.made, model=found, consistent=found))
+
+    def pinocchio(self, tell: Tell = log_note) -> Any:
+        """A `pin.Model` with these inertias, what is carried, gravity, and rotors as `armature`.
+
+        `pin.rnea` of it is `torque` but for effects that Pinocchio has no part for: `tell` hears of
+        them. A floating base is free. Least squares alone finds bodies that cannot be, for which
+        forward dynamics fails: take `consistent`.
+        """
+        found, left = pinocchio_model(self.made.robot, self._standing)
+        if words := in_words(left, self.joint_names):
+            tell(Note(Level.WARNING, f"pin.rnea leaves out: {words}. Model.torque has all"))
+        return found
+
+    def to_mjmodel(self, tell: Tell = log_note) -> Any:
+        """A `mujoco.MjModel`: that of `excite export --format mjcf`, without a file.
+
+        Bodies are those of `consistent`; `frictionloss` is a constraint of MuJoCo's, also in its
+        inverse dynamics. What MuJoCo cannot hold is approximated or left out: `tell` hears of it.
+
+        Raises
+        ------
+        MissingExtraError, RobotError
+            MuJoCo is not installed; it refuses a body.
+        """
+        robot, drive = self.made.robot, drive_of(self.made.spec, self.joint_names)
+        simple, lost = for_simulators(self.made, "mjcf")
+        exported = mjcf(robot, simple, drive)
+        beside = joint_parts(robot, simple)[1]
+        left = [effect for effect in beside if not held_by_actuators(effect, drive)]
+        for note in (*lost, *exported.notes):
+            tell(Note(Level.WARNING if lost or left else Level.NOTE, note))
+        with silent_engine():
+            return load_mujoco().MjModel.from_xml_string(exported.text)
 
     @property
     def _standing(self) -> IdentifiedModel:

@@ -32,7 +32,7 @@ from excite_cli.excitation.sequence import FinishedMotion
 from excite_cli.excitation.sequence import most_motions as most_motions
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.shown.answer import Answer
-from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.shown.note import Level, Note, Tell, log_note, unheard
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis
 from excite_cli.store.fit_file import fit_knowledge
 from excite_cli.store.own_file import versions
@@ -83,6 +83,7 @@ def load_prior(problem: Problem, prior: Prior, name: str, tell: Tell) -> Result 
     if isinstance(prior, Segment):
         stack, words = planned_stack(problem, load_motions(problem, prior)[0])
     else:
+        prior = load_data(problem, prior, tell) if prior.as_given else prior
         stack, words = measured_stack(problem, prior)
     tell(Note(Level.INFO, f"--prior {name}: {words}"))
     return stack
@@ -163,7 +164,7 @@ def plan(
     output: str | Path | None = None,
     overwrite: bool = False,
     resume: bool = False,
-    progress: PlanProgress = lambda motion, progress: None,
+    progress: PlanProgress = unheard,
     workers: Workers | None = None,
     tell: Tell = log_note,
 ) -> Result:

@@ -17,12 +17,12 @@ from excite_cli.proposal.propose import propose as propose_config
 from excite_cli.robot.allowed_files import FolderRequest as FolderRequest
 from excite_cli.robot.description import EXAMPLE_PREFIX, example_robots, is_named
 from excite_cli.robot.mesh_paths import Allow as Allow
-from excite_cli.robot.mesh_paths import allow_nothing, load_with_folders
+from excite_cli.robot.mesh_paths import load_with_folders
 from excite_cli.robot.model import build_robot
 from excite_cli.robot.overview import DescribedRobot, describe, known_robots
 from excite_cli.robot.urdf_joints import survey
 from excite_cli.shown.answer import Answer
-from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.shown.note import Level, Note, Tell, log_note, never
 from excite_cli.summary.problem import proposal_answer
 from excite_cli.summary.robots import robot_answer as robot_answer
 from excite_cli.summary.robots import robots_answer
@@ -87,7 +87,7 @@ def propose(
     boxes: Sequence[str] = (),
     walls: Sequence[str] = (),
     keep_out: Sequence[str] = (),
-    allow: Allow = allow_nothing,
+    allow: Allow = never,
 ) -> Proposal:
     """A config for a robot of which nothing but the URDF is known: `excite init`.
 
@@ -146,7 +146,7 @@ def save_proposal(
     boxes: Sequence[str] = (),
     walls: Sequence[str] = (),
     keep_out: Sequence[str] = (),
-    allow: Allow = allow_nothing,
+    allow: Allow = never,
     overwrite: bool = False,
     tell: Tell = log_note,
 ) -> Answer:
@@ -199,7 +199,7 @@ def limbs_of(
     robot: str,
     package_dirs: Sequence[str | Path] = (),
     xacro_args: Mapping[str, str] | None = None,
-    allow: Allow = allow_nothing,
+    allow: Allow = never,
 ) -> dict[str, tuple[str, ...]]:
     """The joints that would be moved, by the limb they belong to."""
     dirs = tuple(map(str, package_dirs))

@@ -21,6 +21,7 @@ from excite_cli.report.page import render
 from excite_cli.report.plot_figure import matplotlib_part, save_figure, save_pages
 from excite_cli.scoring.records import Score
 from excite_cli.shown.answer import Answer
+from excite_cli.shown.note import unheard
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis
 from excite_cli.store.fit_file import is_fit, read_fit
 from excite_cli.store.own_file import PROGRAM
@@ -220,7 +221,7 @@ def write_report(
     config: str | Path | None = None,
     picture: bool = True,
     overwrite: bool = False,
-    progress: Progress = lambda text, done, total: None,
+    progress: Progress = unheard,
 ) -> Report:
     """A page (HTML, one file) about motions, what was identified and diagnosed: `excite report`.
 

@@ -6,7 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from excite_cli.api.arguments import checked, refuse_twice
-from excite_cli.api.loading import Case, load_data, tell_findings
+from excite_cli.api.loading import Case, dataset_of, load_data, tell_findings
 from excite_cli.api.model import Model, load_model
 from excite_cli.api.outputs import held
 from excite_cli.checks.all_checks import look
@@ -17,7 +17,7 @@ from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.scoring.records import Score, ScoredRun
 from excite_cli.scoring.score import Scorer, Shift, shift_of, together, with_shift
 from excite_cli.scoring.thresholds import Residual, Thresholds, thresholds_of
-from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.shown.note import Level, Note, Tell, log_note, unheard
 from excite_cli.store.score_file import write_score, write_thresholds
 from excite_cli.summary.score import score_answer as score_answer
 from excite_cli.summary.score import thresholds_parts as thresholds_parts
@@ -34,7 +34,7 @@ def score(
     output: str | Path | None = None,
     overwrite: bool = False,
     workers: Workers | None = None,
-    progress: Callable[[str, int], None] = lambda text, done: None,
+    progress: Callable[[str, int], None] = unheard,
     tell: Tell = log_note,
 ) -> Score:
     """Torque predicted by a stored model beside measured torque, nothing fitted: `excite score`.
@@ -60,11 +60,13 @@ def score(
     stored = given.made
     paths = [] if isinstance(data, Dataset) else _paths(data)
     refuse_twice(paths)
+    case = Case(stored.spec, stored.folder, stored.robot)
+    at_hand = dataset_of(case, data, unheard) if isinstance(data, Dataset) else None
     with held({"output": output}, overwrite, (stored.path, *paths)):
 
         def scored(worse: Shift | None, files: Sequence[Path]) -> list[_Scored | Exception]:
-            if isinstance(data, Dataset):
-                return [_scored(given, data, "", held_out, True, worse)]
+            if at_hand is not None:
+                return [_scored(given, at_hand, "", held_out, True, worse)]
             shared = (str(stored.path), held_out, len(paths) == 1, worse)
 
             def watch(news: News) -> None:
@@ -121,7 +123,7 @@ def score_file(
     model, held_out, single, worse = shared
     given = _known_model(model, Path(model).stat().st_mtime_ns)
     case = Case(given.made.spec, given.made.folder, given.made.robot)
-    return _scored(given, load_data(case, path, lambda note: None), path, held_out, single, worse)
+    return _scored(given, load_data(case, path, unheard), path, held_out, single, worse)
 
 
 @lru_cache(maxsize=1)
@@ -204,7 +206,7 @@ def thresholds(
     with held({"thresholds": output}, overwrite, (stored.path, *paths)):
         runs: list[Residual] = []
         for each in [data] if isinstance(data, Dataset) else paths:
-            dataset = each if isinstance(each, Dataset) else load_data(case, each, tell)
+            dataset = dataset_of(case, each, tell)
             for parts in recordings_of(dataset, None, given).values():
                 runs += scorer.residuals(parts)
         found = thresholds_of(stored.robot.joint_names, runs, false_alarms, time_constant)

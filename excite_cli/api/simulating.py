@@ -21,7 +21,7 @@ from excite_cli.export.timed import repeated
 from excite_cli.measurement.hdf5_writer import write_dataset
 from excite_cli.measurement.torque import given_law
 from excite_cli.robot.model import Robot
-from excite_cli.shown.note import Level, Note, Tell, log_note
+from excite_cli.shown.note import Level, Note, Tell, log_note, unheard
 from excite_cli.simulation.base_sensors import Instruments
 from excite_cli.simulation.covariate_series import parse_series as parse_series
 from excite_cli.simulation.ground_truth import parse_planted
@@ -54,7 +54,7 @@ def simulate(
     declared: bool = True,
     output: str | Path | None = None,
     overwrite: bool = False,
-    progress: Callable[[str, int, int], None] = lambda text, done, total: None,
+    progress: Callable[[str, int, int], None] = unheard,
     tell: Tell = log_note,
 ) -> Simulation:
     """Play motions on a MuJoCo robot that differs from its model: `excite simulate`.

@@ -13,7 +13,7 @@ from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.errors import ConfigError
 from excite_cli.excitation.progress import Progress, figure_in_words
 from excite_cli.given_files import refuse_inputs_as_outputs
-from excite_cli.shown.note import Note
+from excite_cli.shown.note import unheard
 from excite_cli.study.case import (
     DoneCase,
     Figures,
@@ -41,7 +41,7 @@ def run_study(
     diagnosed: bool = True,
     resume: bool = False,
     overwrite: bool = False,
-    progress: Callable[[StudyNews], None] = lambda news: None,
+    progress: Callable[[StudyNews], None] = unheard,
     workers: Workers | None = None,
 ) -> list[CaseRecord]:
     """Optimise, or identify and diagnose logs, for every combination of settings.
@@ -88,17 +88,13 @@ def do_case(task: StudyTask, case: StudyCase, tell: Tell) -> DoneCase:
     return do_with(task, case, tell, _optimised if case.log is None else _traced)
 
 
-def _unheard(note: Note) -> None:
-    """A study shows figures of many cases, and no notes on each."""
-
-
 def _optimised(task: StudyTask, case: StudyCase, folder: Path, tell: Tell) -> Figures:
-    problem = load_problem(task.config, overrides_of(task, case), _unheard)
+    problem = load_problem(task.config, overrides_of(task, case), unheard)
 
     def progress(index: int, state: Progress) -> None:
         tell(f"motion {index}, {figure_in_words(state.figure)}")
 
-    result = plan(problem, output=folder / "motions.h5", progress=progress, tell=_unheard)
+    result = plan(problem, output=folder / "motions.h5", progress=progress, tell=unheard)
     last = result.motions[-1]
     proved = all(all(motion.certified.values()) for motion in result.motions)
     return {
@@ -113,7 +109,7 @@ def _optimised(task: StudyTask, case: StudyCase, folder: Path, tell: Tell) -> Fi
 def _traced(task: StudyTask, case: StudyCase, folder: Path, tell: Tell) -> Figures:
     assert case.log is not None
     model = load_case(task.config, overrides_of(task, case))
-    data = load_data(model, case.log, _unheard)
+    data = load_data(model, case.log, unheard)
     fit = identify(model, data)
     save_fit(folder / "fit.h5", model, fit)
     figures: dict[str, float | int | str | None] = {

@@ -14,7 +14,7 @@ from excite_cli.errors import ConfigError, FileError
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.shown.answer import Answer
-from excite_cli.shown.note import Level, Note, Tell, log_note, saying
+from excite_cli.shown.note import Level, Note, Tell, log_note, saying, unheard
 from excite_cli.store.diagnosis_file import is_diagnosis
 from excite_cli.store.fit_file import is_fit
 from excite_cli.store.result_file import is_result, read_result
@@ -97,7 +97,7 @@ def draw_motion(
     fps: float = 12.0,
     seconds: float | None = None,
     overwrite: bool = False,
-    progress: Callable[[str, int, int], None] = lambda text, done, total: None,
+    progress: Callable[[str, int, int], None] = unheard,
     workers: Workers | None = None,
     tell: Tell = log_note,
 ) -> Drawing:

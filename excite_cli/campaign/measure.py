@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from excite_cli.errors import ExciteError
+from excite_cli.shown.note import readable
 
 
 class NotMeasuredError(ExciteError):
@@ -18,6 +19,7 @@ class StillRunningError(NotMeasuredError):
     """Something that may move the robot could not be ended; nothing else is played."""
 
 
+@readable
 def _nothing_refused(log: Path, since: float | None) -> str:
     return ""
 

@@ -12,7 +12,10 @@ from pydantic import (
     model_validator,
 )
 
+from excite_cli.shown.note import readable
 
+
+@readable
 def _not_a_truth_value(value: Any) -> Any:
     """Pydantic takes true for 1; a person who writes true means something else."""
     if isinstance(value, bool):
@@ -97,6 +100,7 @@ def _sections_in(annotation: Any) -> list[type[Section]]:
 def kind_by(key: str, default: str) -> Callable[[Any], Any]:
     """Tells which kind of section is meant: what stands under `key`, else `default`."""
 
+    @readable
     def kind(value: Any) -> Any:
         if isinstance(value, dict):
             return value.get(key, default)

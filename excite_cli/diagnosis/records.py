@@ -18,7 +18,7 @@ from excite_cli.measurement.campaign_clock import Recorded
 from excite_cli.measurement.dataset import Finding
 from excite_cli.robot.model import Array
 from excite_cli.robot.tree import Skeleton
-from excite_cli.shown.answer import Shown
+from excite_cli.shown.answer import Shown, offered
 
 
 @dataclass(frozen=True)
@@ -322,6 +322,25 @@ class Diagnosis(Shown):
     trained: Errors | None = None
     skeleton: Skeleton | None = None
     recorded: Recorded = field(default_factory=Recorded)
+
+    def plot_residual(self, joint: str | None = None, ax: Any = None) -> Any:
+        """Torque of the held-out run in time, and what both models leave of it [N·m] (N).
+
+        A row per joint; measured torque and the declared model's residual are dots, the model with
+        effects is a line. In `ax` (matplotlib) one joint's residual. Axes are returned.
+
+        Raises ConfigError for another joint, MissingExtraError without matplotlib.
+        """
+        return offered(self)["plot_residual"](self, joint, ax)
+
+    def plot_friction(self, joint: str, ax: Any = None) -> Any:
+        """Friction [N·m] (N) that was found on a joint, over its speed: measured, and the law.
+
+        Measured (dots): the training data's torque less all else in the model. Axes are returned.
+
+        Raises ConfigError where none was found, MissingExtraError without matplotlib.
+        """
+        return offered(self)["plot_friction"](self, joint, ax)
 
     @property
     def torque_units(self) -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """The record of a whole run: what was asked, what was found, and on what."""
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import RandomBaseline, RandomMotion
 from excite_cli.excitation.sequence import FinishedMotion
 from excite_cli.robot.model import Array
-from excite_cli.shown.answer import Shown
+from excite_cli.shown.answer import Shown, offered
 
 
 @dataclass(frozen=True, repr=False)
@@ -41,6 +42,18 @@ class Result(Shown):
     versions: dict[str, str] = field(default_factory=dict)
     checked_pairs: tuple[str, ...] = ()
     dropped_pairs: tuple[str, ...] = ()
+
+    def plot(self, motion: int | None = None, joint: str | None = None, ax: Any = None) -> Any:
+        """Position, speed, acceleration in time [rad, m, s] of a motion, by default the last.
+
+        A row per joint; in `ax` (matplotlib) one joint's position. Axes are returned.
+
+        Raises
+        ------
+        ConfigError, RobotError, MissingExtraError
+            There is no such motion or joint; the URDF is gone; matplotlib is not installed.
+        """
+        return offered(self)["plot"](self, motion, joint, ax)
 
     @property
     def effect_names(self) -> tuple[str, ...]:

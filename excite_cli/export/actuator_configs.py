@@ -49,7 +49,7 @@ def joint_values(robot: Robot, model: IdentifiedModel, drive: Drive) -> JointVal
     )
     corrected = drive.corrected(model)
     notes = []
-    beside = [effect for effect in left if not held_by_actuators(effect)]
+    beside = [effect for effect in left if not held_by_actuators(effect, drive)]
     if beside:
         words = in_words(beside, robot.joint_names)
         notes.append(f"not in it: {words}. The file of parameters, and C, hold that")

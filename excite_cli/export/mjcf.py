@@ -70,7 +70,7 @@ def mjcf(robot: Robot, model: IdentifiedModel, drive: Drive | None = None) -> Mo
     _add_couplings(root, robot, tree)
     notes = ["it has no shapes, actuators or sensors"]
     if drive is not None:
-        left = [effect for effect in left if not held_by_actuators(effect)]
+        left = [effect for effect in left if not held_by_actuators(effect, drive)]
         notes = ["it has no shapes or sensors"]
         notes += add_actuators(root, robot.joint_names, drive.corrected(model))
     ElementTree.indent(root)
@@ -216,9 +216,9 @@ _ROUNDING = 1e-7
 _SHORTEST_STEP = 5e-4  # s: a physics step for which the history of set points is long enough
 
 
-def held_by_actuators(effect: Effect) -> bool:
-    """Whether the actuators' coefficients hold it."""
-    return effect.kind in ("torque_gain", "torque_offset") and not effect.runs
+def held_by_actuators(effect: Effect, drive: Drive | None) -> bool:
+    """Whether the coefficients of the actuators, if there are any, hold it."""
+    return drive is not None and effect.kind in ("torque_gain", "torque_offset") and not effect.runs
 
 
 def add_actuators(root: ElementTree.Element, joint_names: Sequence[str], drive: Drive) -> list[str]:

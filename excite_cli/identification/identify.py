@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -47,7 +48,7 @@ from excite_cli.identification.torque_trace import TorqueTrace, torque_trace, to
 from excite_cli.measurement.campaign_clock import Recorded, recorded
 from excite_cli.measurement.dataset import Dataset, Finding
 from excite_cli.robot.model import Robot
-from excite_cli.shown.answer import Shown
+from excite_cli.shown.answer import Shown, offered
 
 Tell = Callable[[str], None]
 # Parameters this many standard deviations below zero that cannot be negative are reported.
@@ -78,6 +79,13 @@ class Identification(Shown):
     traces: tuple[TorqueTrace, ...] = ()
     recorded: Recorded = field(default_factory=Recorded)
     spec: Spec | None = None
+
+    def plot_residual(self, joint: str | None = None, ax: Any = None) -> Any:
+        """Torque of the held-out part in time, measured and of the fit, and the residual.
+
+        As `Diagnosis.plot_residual`.
+        """
+        return offered(self)["plot_residual"](self, joint, ax)
 
 
 def identify(

@@ -12,6 +12,8 @@ from excite_cli.given_files import require_stored
 from excite_cli.measurement.arrange import arrange, check_names, listed
 from excite_cli.measurement.base_channel import channels_of_base
 from excite_cli.measurement.covariates import DeclaredCovariates
+from excite_cli.measurement.csv_reader import run_of_table
+from excite_cli.measurement.csv_table import NamedColumns
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
 from excite_cli.measurement.joined_files import is_part, with_joined
 from excite_cli.measurement.missing_values import known_stamps
@@ -44,7 +46,7 @@ _EPOCH = 1e6  # s: stamps beyond count from 1970, not from the start
 
 
 def read_dataset(
-    paths: Sequence[Path],
+    given: Sequence[Path] | Dataset,
     spec: MeasurementSpec,
     joint_names: tuple[str, ...],
     limits: tuple[Array, Array, Array, Array] | None = None,
@@ -52,7 +54,7 @@ def read_dataset(
     motors: Motors | None = None,
     rows: Collection[str] = ("joints",),
 ) -> Dataset:
-    """Read measured files as one data set, converted and checked.
+    """Read measured files, or data that are `as_given`, as one data set, converted and checked.
 
     `limits`: lower, upper, velocity, effort of the moved joints, (n,) each, infinite where there is
     none. `revolute` (n,): which joints turn (default all); angles in degrees are theirs. `motors`:
@@ -72,7 +74,8 @@ def read_dataset(
     MissingExtraError
         A bag or parquet, and the library for it is not installed.
     """
-    if not paths:
+    paths = () if isinstance(given, Dataset) else given
+    if not isinstance(given, Dataset) and not paths:
         raise FileError("No measured file is given.")
     places = joint_names if motors is None else (*joint_names, *motors.places)
     check_names(spec.names, places)
@@ -96,6 +99,7 @@ def read_dataset(
         channels_of_base(spec) if "base" in rows else (),
     )  # fmt: skip
     findings: list[Finding] = declared(spec, joint_names, motors)
+    findings += given.findings if isinstance(given, Dataset) else ()
     runs: list[Run] = []
     taken: set[str] = set()
     seen: set[str] = set()
@@ -103,7 +107,7 @@ def read_dataset(
     noted: list[list[Finding]] = []
 
     def arranged() -> Iterator[tuple[Path, list[Run]]]:
-        for path, raws in _recordings(paths, options):
+        for path, raws in _recordings(given, options):
             seen.update(name for raw in raws for column in raw.columns.values() for name in column)
             own, noticed = [], []
             for raw in _named(raws, path, taken):
@@ -113,7 +117,8 @@ def read_dataset(
                     spec.torque_names, options.beside,
                 )  # fmt: skip
                 t, epoch = _seconds(raw, spec)
-                run = replace(run, t=t, epoch=epoch, origin=Origin(str(path), raw.place))
+                origin = Origin(str(path) if paths else "", raw.place)
+                run = replace(run, t=t, epoch=epoch, origin=origin)
                 run = covariates.take(run, raw, spec.names)
                 own.append(to_joints(run, spec, joint_names, turning, motors).kept(spool))
                 noticed += more
@@ -138,14 +143,22 @@ def _moves_elsewhere(found: Finding, runs: Sequence[Run], joint_names: tuple[str
     return any(np.ptp(run.q[:, j]) > 0.0 for run in runs)
 
 
-def _recordings(paths: Sequence[Path], options: ReadOptions) -> Iterator[tuple[Path, list[RawRun]]]:
+def _recordings(
+    given: Sequence[Path] | Dataset, options: ReadOptions
+) -> Iterator[tuple[Path, list[RawRun]]]:
     """What the files hold, one after the other; those with some channels of a recording are joined.
 
     Of one recording only: which file belongs to which of several cannot be known. It takes the
     place of the first.
     """
+    if isinstance(given, Dataset):  # as the tables that they would be in files
+        place = Path("data from Python")
+        for run in given.runs:
+            raw = run_of_table(place, NamedColumns(run.extra), options)
+            yield from with_joined([(place, [replace(raw, name=run.name)])], options)
+        return
     later: list[tuple[Path, list[RawRun]]] = []
-    for path in paths:
+    for path in given:
         raws = reader_for(path).read(path, options)
         if later or any(is_part(raw, options) for raw in raws):
             later.append((path, raws))

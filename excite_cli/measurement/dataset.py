@@ -6,11 +6,12 @@ configuration declares; nothing is dropped silently: `findings` says what was se
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.measurement.at_hand import columns_in, names_of, tables_of
 from excite_cli.measurement.run_identity import Origin, Part, RunId
 from excite_cli.out_of_core import Spool
 from excite_cli.shown.answer import Shown
@@ -19,6 +20,7 @@ _BEFORE = 20.0  # s: longer ago is forgotten
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Severity = Literal["note", "warning", "error"]
+Given = Array | Sequence[Array]  # of one recording, or of each of several
 
 
 class TorqueLaw(Protocol):
@@ -148,12 +150,67 @@ class Run(Shown):
 
 @dataclass(frozen=True, repr=False)
 class Dataset(Shown):
-    """Runs of one robot; columns are in the order of `joint_names`."""
+    """Runs of one robot; columns are in the order of `joint_names`.
+
+    Those `as_given` are in units of their own, with all their columns in `extra`: functions that
+    have a config read these as they would those of a CSV. `load_data` does so alone.
+    """
 
     joint_names: tuple[str, ...]
     runs: tuple[Run, ...]
     sources: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
+    as_given: bool = False
+
+    @classmethod
+    def from_arrays(
+        cls,
+        joint_names: Sequence[str],
+        t: Given,
+        q: Given,
+        tau: Given | None = None,
+        *,
+        dq: Given | None = None,
+        names: Sequence[str] = (),
+        covariates: Mapping[str, Given] | None = None,
+        extra: Mapping[str, Given] | None = None,
+    ) -> Self:
+        """Recordings at hand: t (T,), positions q, torques tau and speeds dq (T, n).
+
+        Units and signs are those that the config's `measurement` declares (by default s, rad or m,
+        N·m or N), and the checks of files are made of them. `covariates` (T,), such as a
+        temperature, and `extra` channels, (T,) or (T, n) with a column per joint, are found by
+        their names. Of several recordings all are lists of arrays; `names` are theirs.
+
+        Raises
+        ------
+        ConfigError
+            Shapes or lengths of lists differ, a name is there twice, or values are no numbers.
+        """
+        given = {**(covariates or {}), **(extra or {}), "t": t, "q": q, "tau": tau, "dq": dq}
+        tables = tables_of(joint_names, given, covariates or ())
+        return replace(cls.from_frame([*tables], names=names), joint_names=tuple(joint_names))
+
+    @classmethod
+    def from_frame(cls, frame: Any, *, names: Sequence[str] = ()) -> Self:
+        """Recordings in tables with the columns of a CSV: `t`, `q_<joint>`, `tau_<joint>`, ….
+
+        `frame` is a pandas DataFrame, or anything else that has its columns by name (polars, Arrow,
+        a dict of arrays); of several recordings a list. Otherwise as `from_arrays`.
+
+        Raises
+        ------
+        ConfigError
+            It is no table, or columns have different lengths.
+        """
+        tables = [columns_in(x) for x in (frame if isinstance(frame, list | tuple) else [frame])]
+        called = names_of(names, len(tables))
+        own = (key for columns, _ in tables[:1] for key in columns if key.startswith("q_"))
+        joints = tuple(key[2:] for key in own if not key.startswith("q_cmd_"))
+        runs = (_as_given(name, joints, x) for name, (x, _) in zip(called, tables, strict=True))
+        words = ", ".join(dict.fromkeys(word for _, left in tables for word in left))
+        found = Finding("words", "note", f"columns of words are left out: {words}")
+        return cls(joints, tuple(runs), (), (found,) if words else (), as_given=True)
 
     @property
     def recordings(self) -> tuple[str, ...]:
@@ -164,6 +221,16 @@ class Dataset(Shown):
     def names(self) -> tuple[str, ...]:
         """What a configuration may call runs: recordings, then stretches of those with gaps."""
         return tuple(dict.fromkeys((*self.recordings, *(run.id.key for run in self.runs))))
+
+
+def _as_given(name: str, joints: Sequence[str], columns: dict[str, Array]) -> Run:
+    """NaN where there is no such column."""
+    nothing = np.full(len(next(iter(columns.values()))), np.nan)
+    q, tau = (
+        np.array([columns.get(f"{channel}_{joint}", nothing) for joint in joints]).T
+        for channel in ("q", "tau")
+    )
+    return Run(name, columns.get("t", nothing), q, tau, extra=columns)
 
 
 # Findings of one kind as one sentence: the first as it is, of the others where they are.

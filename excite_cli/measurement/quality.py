@@ -226,7 +226,8 @@ def raise_for_errors(dataset: Dataset) -> None:
     errors = [found for found in dataset.findings if found.severity == "error"]
     if errors:
         lines = "".join(f"\n- {sentence(found)}" for found in merged(errors))
-        raise FileError(f"{', '.join(dataset.sources)}: these data cannot be used:{lines}")
+        where = ", ".join(dataset.sources) or "data from Python"
+        raise FileError(f"{where}: these data cannot be used:{lines}")
 
 
 def sentence(finding: Finding) -> str:

@@ -40,10 +40,11 @@ from excite_cli.proposal.shapes import (
 )
 from excite_cli.robot.assumed_inertias import with_assumed_inertias
 from excite_cli.robot.description import RobotDescription
-from excite_cli.robot.mesh_paths import Allow, allow_nothing, load_with_folders
+from excite_cli.robot.mesh_paths import Allow, load_with_folders
 from excite_cli.robot.model import build_robot
 from excite_cli.robot.urdf_joints import UrdfSurvey
 from excite_cli.shown.answer import Shown
+from excite_cli.shown.note import never
 
 _TORQUE_SHARE = 0.8
 _MARGIN = 0.01
@@ -84,7 +85,7 @@ class Request:
     xacro_args: Mapping[str, str] = field(default_factory=dict)
     srdf: Path | None = None
     overrides: tuple[str, ...] = ()
-    allow: Allow = allow_nothing
+    allow: Allow = never
     cell: Cell = field(default_factory=Cell)
 
 

@@ -194,7 +194,7 @@ def _plot_figure_draw(figure: "Figure", grid: Any, plot: Plot, title: str) -> No
         axes.tick_params(pad=2, labelbottom=number == len(plot.panels) - 1)
         for low, high in plot.shaded:
             axes.axvspan(low, high, color=HELD_OUT, linewidth=0, label="_")
-        _draw_panel(axes, plot.x, panel)
+        draw_panel(axes, plot.x, panel)
         if plot.counted and len(plot.x) <= _LABELLED:
             _label(axes, plot.x, panel)
         axes.set_ylabel(panel.axis, labelpad=2)
@@ -207,7 +207,8 @@ def _plot_figure_draw(figure: "Figure", grid: Any, plot: Plot, title: str) -> No
     )
 
 
-def _draw_panel(axes: "Axes", x: Array, panel: Panel) -> None:
+def draw_panel(axes: "Axes", x: Array, panel: Panel) -> None:
+    """All series of a panel over x (T,), and its axis."""
     for series in panel.series:
         _draw_series(axes, x, series)
     if panel.logarithmic:

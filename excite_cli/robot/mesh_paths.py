@@ -27,6 +27,7 @@ from excite_cli.robot.allowed_files import (
 from excite_cli.robot.description import EXAMPLE_PREFIX, RobotDescription, load_description
 from excite_cli.robot.mesh_trial import MAX_BYTES, copy_of, faults
 from excite_cli.robot.ros_packages import package_in, search_package, variables_in_words
+from excite_cli.shown.note import never
 
 Kind = Literal["collision", "visual"]
 
@@ -245,17 +246,12 @@ _ABOVE = 4  # folders above the URDF that relative paths may start from
 Allow = Callable[[FolderRequest], bool]
 
 
-def allow_nothing(needed: FolderRequest) -> bool:
-    """The answer of one who was not asked."""
-    return False
-
-
 def load_with_folders(
     urdf: str,
     package_dirs: tuple[str, ...],
     relative_to: Path,
     arguments: Mapping[str, object] | None = None,
-    allow: Allow = allow_nothing,
+    allow: Allow = never,
 ) -> tuple[RobotDescription, tuple[FolderRequest, ...]]:
     """The description, as `load_description`, and what had to be allowed for it.
 

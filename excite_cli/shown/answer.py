@@ -9,7 +9,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from html import escape
+from importlib import import_module
+from types import MappingProxyType
 from typing import Any, Self, TypeVar
+
+from excite_cli.errors import ConfigError, MissingExtraError, nearest
 
 
 class Detail(IntEnum):
@@ -240,10 +244,16 @@ def _text(text: str) -> str:
     return escape(text).replace("\n", "<br>")
 
 
+# What a record offers in Python: rows of tables by their names, and what its `plot…` draw.
+Offers = Mapping[str, Callable[..., Any]]
+_OF_EFFECTS = ("effect", "joints", "parameter", "value", "std", "unit")  # where there are none
+
+
 @dataclass(frozen=True)
 class _Shown:
     words: Callable[[Any], str]
     parts: Callable[[Any], Parts]
+    offers: Offers
 
 
 _known: dict[type, _Shown] = {}
@@ -264,13 +274,45 @@ class Shown:
         found = _found(type(self))
         return None if found is None else as_html(found.parts(self))
 
+    def table(self, name: str) -> Any:
+        """A pandas DataFrame of a diagnosis or fit: "effects", "errors" or "parameters".
+
+        `unit` is that of `value`, or of `rms_…`; `error_…`, `share…` and `gain` are shares.
+
+        Raises ConfigError where there is no such table, MissingExtraError without pandas.
+        """
+        tables = {key: rows for key, rows in offered(self).items() if not key.startswith("plot")}
+        if name not in tables:
+            kind, own = type(self).__name__, ", ".join(tables) or "none"
+            close = nearest(str(name), tables)
+            raise ConfigError(f"{kind} has no table '{name}'. Tables: {own}.{close}")
+        try:
+            pandas = import_module("pandas")
+        except ImportError as error:
+            raise MissingExtraError(
+                "Tables need pandas, which is not installed. Run: pip install 'excite-cli[tables]'"
+            ) from error
+        rows = tables[name](self)
+        return pandas.DataFrame(rows, columns=None if rows else _OF_EFFECTS)
+
 
 T = TypeVar("T", bound=Shown)
 
 
-def show(kind: type[T], words: Callable[[T], str], parts: Callable[[T], Parts]) -> None:
-    """State how records of `kind` are shown: in words (inside brackets), and as tables."""
-    _known[kind] = _Shown(words, parts)
+def show(
+    kind: type[T],
+    words: Callable[[T], str],
+    parts: Callable[[T], Parts],
+    offers: Offers = MappingProxyType({}),
+) -> None:
+    """State how records of `kind` are shown: in words (inside brackets), as tables, in Python."""
+    _known[kind] = _Shown(words, parts, offers)
+
+
+def offered(record: Shown) -> Offers:
+    """What the record offers in Python."""
+    found = _found(type(record))
+    return {} if found is None else found.offers
 
 
 def _found(kind: type) -> _Shown | None:

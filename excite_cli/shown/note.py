@@ -8,6 +8,8 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from functools import update_wrapper
+from typing import Any, TypeVar, cast
 
 
 class Level(Enum):
@@ -41,8 +43,39 @@ class Note:
 
 
 Tell = Callable[[Note], None]
+F = TypeVar("F", bound=Callable[..., Any])
 
 
+class _Readable:
+    def __init__(self, function: Callable[..., Any]) -> None:
+        update_wrapper(self, function)
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        return self.__wrapped__(*args, **kwargs)  # type: ignore[attr-defined]
+
+    def __repr__(self) -> str:
+        return str(self.__qualname__)  # type: ignore[attr-defined]
+
+    __reduce__ = __repr__  # kept by name, as functions are
+
+
+def readable(function: F) -> F:
+    """The function, shown as its name where it is the default of an argument."""
+    return cast(F, _Readable(function))
+
+
+@readable
+def unheard(*told: object) -> None:
+    """Tell nobody."""
+
+
+@readable
+def never(*asked: object) -> bool:
+    """Say no, whenever it is asked."""
+    return False
+
+
+@readable
 def log_note(note: Note) -> None:
     """Hand a note to Python's logger "excite"."""
     about = f"{note.where}: " if note.where else ""

@@ -42,6 +42,7 @@ from excite_cli.summary.cells import files_in_words
 from excite_cli.summary.effect_evidence import evidence_section
 from excite_cli.summary.error_by_joint import errors_section
 from excite_cli.summary.findings import data_blocks
+from excite_cli.summary.frames import OF_DIAGNOSIS
 from excite_cli.summary.named_effects import (
     effect_table,
     found_section,
@@ -355,7 +356,7 @@ def _named_in_words(named: NamedEffect) -> str:
     return f"{what_and_where(named.effect, 0)}: {', '.join(sizes)}"
 
 
-show(Diagnosis, _in_words, diagnosis_parts)
+show(Diagnosis, _in_words, diagnosis_parts, OF_DIAGNOSIS)
 show(
     NamedEffect,
     _named_in_words,

@@ -128,20 +128,23 @@ def _over_speed(trace: EffectTrace) -> bool:
 
 def friction_plots(found: Diagnosis, traces: Traces) -> tuple[Plot, ...]:
     """For each joint with several effects over its speed: all of them at once."""
-    units = dict(zip(found.joint_names, traces.torque_units, strict=True))
-    charts = []
-    for joint in found.joint_names:
-        parts = [
-            trace
-            for trace in traces.effects
-            if _over_speed(trace) and trace.rows == (joint,) and not trace.runs
-        ]
-        if len(parts) < 2 or not _same_samples(parts):
-            continue
-        clouds: list[Cloud] = [cloud_of(trace, 0, units[joint]) for trace in parts]
-        names = ", ".join(trace.kind for trace in parts)
-        charts.append(cloud_plot(f"Friction of {joint}", together(clouds), f"{names}."))
-    return tuple(charts)
+    clouds = friction_clouds(found, traces, fewest=2)
+    return tuple(cloud_plot(f"Friction of {joint}", *both) for joint, both in clouds.items())
+
+
+def friction_clouds(
+    found: Diagnosis, traces: Traces | None, fewest: int = 1
+) -> dict[str, tuple[Cloud, str]]:
+    """By the joint, `fewest` or more effects over its speed as one, and their kinds."""
+    clouds = {}
+    for joint, unit in zip(found.joint_names, found.torque_units, strict=True):
+        every = traces.effects if traces else ()
+        parts = [t for t in every if _over_speed(t) and t.rows == (joint,) and not t.runs]
+        parts = parts if parts and _same_samples(parts) else parts[:1]
+        if len(parts) >= fewest and np.isfinite(parts[0].partial).any():
+            own = together([cloud_of(trace, 0, unit) for trace in parts])
+            clouds[joint] = own, f"{', '.join(trace.kind for trace in parts)}."
+    return clouds
 
 
 def _same_samples(parts: Sequence[EffectTrace]) -> bool:

@@ -80,7 +80,9 @@ def _moving(found: Diagnosis) -> Table:
         if _has_parts(found):
             row[_OFF] = _taken_off(found, joint)
         rows.append(row)
-    errors = {name: percent(each.mean_relative_moving) for name, each in _errors(found).items()}
+    errors = {
+        name: percent(each.mean_relative_moving) for name, each in errors_by_model(found).items()
+    }
     title = (
         f"Error of the torque on held-out data ({found.held_out_run}), where joints move "
         f"({_columns_in_words(found)})"
@@ -99,7 +101,7 @@ def _with_mean(
 def _row(found: Diagnosis, joint: str, unit: str, moving: bool) -> dict[str, str]:
     errors = {
         name: percent((each.relative_moving if moving else each.relative)[joint])
-        for name, each in _errors(found).items()
+        for name, each in errors_by_model(found).items()
     }
     before, after = ((_rms(each) if moving else each.rms) for each in (found.before, found.after))
     rms = {"RMS declared": figure(before[joint]), "RMS with effects": figure(after[joint])}
@@ -115,7 +117,7 @@ def _columns_in_words(found: Diagnosis) -> str:
     return f"{given}declared model and textbook friction, both refitted"
 
 
-def _errors(found: Diagnosis) -> dict[str, Errors]:
+def errors_by_model(found: Diagnosis) -> dict[str, Errors]:
     """By heads of columns."""
     known = {
         "URDF": found.untouched,
@@ -216,5 +218,5 @@ def _all_samples(found: Diagnosis) -> Table:
         f"Over all samples of {found.held_out_run}, including joints at rest (unfiltered: with "
         "effects, the torque as recorded)"
     )
-    errors = {name: percent(each.mean_relative) for name, each in _errors(found).items()}
+    errors = {name: percent(each.mean_relative) for name, each in errors_by_model(found).items()}
     return _with_mean(title, rows, errors, folded=True)

@@ -43,6 +43,7 @@ from excite_cli.summary.cells import (
     percent,
 )
 from excite_cli.summary.findings import data_blocks
+from excite_cli.summary.frames import OF_FIT, OF_IDENTIFICATION, parameters_of
 
 _CORRELATED, _MOST_PAIRS = 0.95, 15
 
@@ -191,13 +192,10 @@ def _error_table(found: Identification | StoredFit) -> Table:
 def _data(found: Identification) -> dict[str, Any]:
     """The answer for `--json`."""
     fit, bias = found.fit, found.hausman
-    columns = ("values", "std", "relative_std", "identifiable", "essential", "units")
-    keys = ("name", "value", *columns[1:-1], "unit")
-    table = zip(fit.names, *(data_of(getattr(fit, name)) for name in columns), strict=True)
     consistent = fit.consistent
     return {
         **data_of(found, "held_out_run", "error", "training_error", "noise_floor"),
-        "parameters": [dict(zip(keys, row, strict=True)) for row in table],
+        "parameters": parameters_of(fit),
         "effects": [
             {
                 "kind": effect.kind,
@@ -367,9 +365,9 @@ def correlated_parameters(fit: Fit) -> tuple[Block, ...]:
     )
 
 
-show(Fit, _fit_in_words, lambda fit: [_parameter_table(fit)])
-show(Identification, _in_words, identification_parts)
-show(StoredFit, _in_words, _stored_parts)
+show(Fit, _fit_in_words, lambda fit: [_parameter_table(fit)], OF_FIT)
+show(Identification, _in_words, identification_parts, OF_IDENTIFICATION)
+show(StoredFit, _in_words, _stored_parts, OF_IDENTIFICATION)
 
 
 # What the robot carries, as a table and as data.

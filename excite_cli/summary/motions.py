@@ -18,6 +18,7 @@ from excite_cli.excitation.progress import Status
 from excite_cli.excitation.result import Comparison, RandomMotion, Result
 from excite_cli.excitation.sequence import flattered
 from excite_cli.fields import data_of
+from excite_cli.report.record_plots import plot_motion
 from excite_cli.shown.answer import Answer, Detail, Parts, Table, show
 from excite_cli.summary.pairs import (
     doubts_in_words,
@@ -268,7 +269,7 @@ def _segment_in_words(segment: Segment) -> str:
     return f"{segment.name}: {joints} joints, {segment.trajectory.duration:.4g} s"
 
 
-show(Result, _in_words, result_parts)
+show(Result, _in_words, result_parts, {"plot": plot_motion})
 show(Motion, motion_sentence, lambda motion: _tables([motion]))
 show(Segment, _segment_in_words, lambda segment: [_segment_in_words(segment)])
 show(

@@ -12,6 +12,7 @@ from math import comb
 
 import numpy as np
 
+from excite_cli.errors import ConfigError
 from excite_cli.shown.answer import Shown
 from excite_cli.trajectory.base import Array, Trajectory
 from excite_cli.trajectory.fourier import FourierTrajectory
@@ -27,6 +28,23 @@ class Segment(Shown):
     name: str
     trajectory: Trajectory
     coefficients: Array
+
+    def at(self, t: float | Array) -> tuple[Array, Array, Array]:
+        """Positions, speeds, accelerations at any time: (n,) each at t [s], (T, n) at t (T,).
+
+        Raises
+        ------
+        ConfigError
+            A time is before the start or after the end.
+        """
+        times, end = np.asarray(t, dtype=float), self.trajectory.duration
+        if times.ndim > 1 or not ((times >= 0.0) & (times <= end * (1.0 + 1e-12))).all():
+            raise ConfigError(
+                f"{self.name}: give t from 0 to {end:g} s, a number or (T,); of a motion that "
+                "repeats, t % duration."
+            )
+        q, v, a = self.trajectory.states(np.atleast_1d(times), self.coefficients)
+        return (q, v, a) if times.ndim else (q[0], v[0], a[0])
 
 
 @dataclass(frozen=True)

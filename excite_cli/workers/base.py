@@ -22,6 +22,7 @@ import numpy as np
 
 from excite_cli.errors import ExciteError
 from excite_cli.out_of_core import Spool, attached, reference_to
+from excite_cli.shown.note import unheard
 
 # Messages between processes of one machine, in which large arrays are named and not copied.
 #
@@ -92,10 +93,6 @@ class News:
 Watch = Callable[[News], None]
 
 
-def unwatched(news: News) -> None:
-    """Report to nobody."""
-
-
 class Workers(ABC):
     """A place where tasks are done; to be closed, best with `with`."""
 
@@ -117,7 +114,7 @@ class Workers(ABC):
         function: Function,
         shared: Any,
         tasks: Iterable[Any],
-        watch: Watch = unwatched,
+        watch: Watch = unheard,
         *,
         keep_failures: bool = False,
     ) -> list[Any]:

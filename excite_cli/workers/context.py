@@ -10,6 +10,7 @@ from typing import Any
 
 from excite_cli.errors import ConfigError
 from excite_cli.out_of_core import forget, room_of_spools
+from excite_cli.shown.note import unheard
 from excite_cli.workers.base import Function, Here, Workers
 
 _place: ContextVar[Workers | None] = ContextVar("workers at hand", default=None)
@@ -57,7 +58,7 @@ def open_workers(
     count: int = 1,
     scheduler: str | None = None,
     threads: int = 1,
-    warn: Callable[[str], None] = lambda text: None,
+    warn: Callable[[str], None] = unheard,
 ) -> Workers:
     """This process, `count` processes of this machine, or the dask cluster of `scheduler`.
 

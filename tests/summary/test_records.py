@@ -13,6 +13,7 @@ import pytest
 import excite_cli
 from excite_cli import (
     Case,
+    Effect,
     Problem,
     Result,
     check,
@@ -64,7 +65,7 @@ SCORED = ScoredRun(
 THRESHOLDS = Thresholds(("a", "b"), np.ones((2, 4)), np.array([3.0, 4.0]), 0.5, 0.02)
 # Settings, and records of a few words, which Python itself shows well.
 SHORT = {"Drawing", "Exported", "Level", "Note", "Report", "Serving", "SimulationSettings", "View"}
-SHORT |= {"Take"}
+SHORT |= {"Take", "Answer", "CaseRecord"}
 BRIEF = ["optimizer.max_iterations=6", "sequence.motions=1"]
 
 
@@ -130,7 +131,7 @@ def test_every_public_record_has_words_and_tables() -> None:
     for name, kind in public.items():
         if (
             not isinstance(kind, type)
-            or issubclass(kind, Exception | Workers | Measure)
+            or issubclass(kind, Exception | Workers | Measure | Effect)
             or name in SHORT
         ):
             continue

@@ -1,13 +1,16 @@
 """A source of torque: which columns of a log it takes, and what torque of the joints they are."""
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from excite_cli.config.data_spec import MeasurementSpec
-from excite_cli.measurement.dataset import Array, Run, TorqueLaw
+if TYPE_CHECKING:
+    from excite_cli.config.data_spec import MeasurementSpec
+    from excite_cli.measurement.dataset import Array, Run, TorqueLaw
 
 
 class TorqueSource(ABC):
