@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from excite_cli.api.files import write_dataset as write_dataset
     from excite_cli.api.files import write_diagnosis as write_diagnosis
     from excite_cli.api.files import write_result as write_result
+    from excite_cli.api.forecasting import forecast as forecast
     from excite_cli.api.identifying import identify as identify
     from excite_cli.api.identifying import identify_load as identify_load
     from excite_cli.api.identifying import save_fit as save_fit
@@ -86,6 +87,7 @@ if TYPE_CHECKING:
     from excite_cli.robot.overview import DescribedRobot as DescribedRobot
     from excite_cli.scoring.changes import Change as Change
     from excite_cli.scoring.changes import Changes as Changes
+    from excite_cli.scoring.forecast import Forecast as Forecast
     from excite_cli.scoring.records import Replay as Replay
     from excite_cli.scoring.records import Score as Score
     from excite_cli.scoring.records import ScoredRun as ScoredRun
@@ -118,6 +120,7 @@ _HOMES = {
         "write_diagnosis",
         "write_result",
     ),
+    "api.forecasting": ("forecast",),
     "api.identifying": ("identify", "identify_load", "save_fit"),
     "api.inspecting": ("LogInspection", "inspect"),
     "api.load_planning": ("LoadProblem", "plan_load"),
@@ -162,6 +165,7 @@ _HOMES = {
     "measurement.dataset": ("Dataset", "Run"),
     "proposal.propose": ("Proposal",),
     "scoring.changes": ("Change", "Changes"),
+    "scoring.forecast": ("Forecast",),
     "scoring.records": ("Replay", "Score", "ScoredRun", "SetPointReplay"),
     "scoring.thresholds": ("Thresholds",),
     "shown.note": ("Level", "Note"),

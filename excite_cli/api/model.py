@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.regression import Series
 from excite_cli.identification.stored_model import StoredModel
 from excite_cli.robot.model import Array
+from excite_cli.scoring.validity import Trust
 from excite_cli.shown.answer import Shown, show
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.simulation.mujoco_model import load_mujoco, silent_engine
@@ -63,7 +65,7 @@ class Model(Shown):
     @property
     def effects(self) -> tuple[Effect, ...]:
         """The effects that are in its torque."""
-        return self._standing.effects
+        return self.standing.effects
 
     @property
     def left_out(self) -> tuple[Effect, ...]:
@@ -83,7 +85,7 @@ class Model(Shown):
         them. A floating base is free. Least squares alone finds bodies that cannot be, for which
         forward dynamics fails: take `consistent`.
         """
-        found, left = pinocchio_model(self.made.robot, self._standing)
+        found, left = pinocchio_model(self.made.robot, self.standing)
         if words := in_words(left, self.joint_names):
             tell(Note(Level.WARNING, f"pin.rnea leaves out: {words}. Model.torque has all"))
         return found
@@ -110,8 +112,35 @@ class Model(Shown):
             return load_mujoco().MjModel.from_xml_string(exported.text)
 
     @property
-    def _standing(self) -> IdentifiedModel:
+    def standing(self) -> IdentifiedModel:
+        """The model without effects of single recordings."""
         return self.made.model.without(self.left_out)
+
+    @overload
+    def torque(
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+        t: Array | None = None,
+        covariates: Mapping[str, Array] | None = None,
+        start: float = 0.0,
+        *,
+        std: Literal[False] = False,
+    ) -> Array: ...
+
+    @overload
+    def torque(
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+        t: Array | None = None,
+        covariates: Mapping[str, Array] | None = None,
+        start: float = 0.0,
+        *,
+        std: Literal[True],
+    ) -> tuple[Array, Array]: ...
 
     def torque(
         self,
@@ -121,21 +150,37 @@ class Model(Shown):
         t: Array | None = None,
         covariates: Mapping[str, Array] | None = None,
         start: float = 0.0,
-    ) -> Array:
+        *,
+        std: bool = False,
+    ) -> Array | tuple[Array, Array]:
         """τ of states: rigid bodies and all effects, as the error table has it.
 
         `t` (T,) [s], equidistant, makes them a series; memory of friction, elastic gears, delays
         and drift need one. `covariates` (T,) are the columns of the log that effects follow, by
         name; `start` is the campaign's time at t = 0 [s], for friction that changes over it.
 
+        With `std` also the standard deviation, shaped as τ [N·m] (N), by which a torque measured in
+        that state would differ: noise, parameters and effects that the model lacks, larger outside
+        the speeds and loads of its data (`scoring/validity.py`). NaN of joints without data.
+
         Raises
         ------
         ConfigError
-            Shapes do not fit; an effect needs `t` or a column that is not given.
+            Shapes do not fit; an effect needs `t` or a column that is not given; `std` of a model
+            that does not say what it left of its own data.
         """
         series, single = self._series(q, v, a, t, covariates, start)
-        torque = self._standing.predicted(self.made.robot, series).torque
-        return torque[0] if single else torque
+        found = self.standing.predicted(self.made.robot, series)
+        torque = found.torque[0] if single else found.torque
+        if not std:
+            return torque
+        deviation = self.trust.deviation(series, found.load)
+        return torque, deviation[0] if single else deviation
+
+    @cached_property
+    def trust(self) -> Trust:
+        """Where its torque is how exact; ConfigError where it keeps no residual of its own data."""
+        return Trust(self.made)
 
     def friction(self, q: Array, v: Array, load: Array | None = None) -> Array:
         """Torque of the effects that follow the speed: friction in all its forms.
@@ -144,7 +189,7 @@ class Model(Shown):
         """
         q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
         series, single = self._series(q, v, np.zeros_like(q), None, None, 0.0, check=False)
-        robot, model = self.made.robot, self._standing
+        robot, model = self.made.robot, self.standing
         body = RigidBody(robot, model.phi + model.carried(robot), series.q, 0 * series.v, series.a)
         carried = (
             body.load if load is None else np.asarray(load, dtype=float).reshape(series.q.shape)
@@ -178,7 +223,7 @@ class Model(Shown):
         flat = [effect.kind for effect in self.effects if _without_slope(effect)]
         if flat:
             raise ConfigError(f"no derivatives: {', '.join(dict.fromkeys(flat))} has none.")
-        found = self._standing.pull_back(self.made.robot, series, w)
+        found = self.standing.pull_back(self.made.robot, series, w)
         return tuple(each[0] if single else each for each in found)  # type: ignore[return-value]
 
     def derivatives(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:

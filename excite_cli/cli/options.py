@@ -46,6 +46,10 @@ Data = Annotated[
     list[Path],
     typer.Argument(help="Measured data: {readers}.", show_default=False),
 ]
+MaybeData = Annotated[
+    list[Path] | None,
+    typer.Argument(help="Measured data: {readers}.", show_default=False),
+]
 HeldOut = Annotated[
     str | None,
     typer.Option("--held-out", metavar="RUN", help="Run kept out of the fit. Default: the last."),

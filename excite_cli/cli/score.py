@@ -6,13 +6,20 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.errors import ConfigError
 
 
 @options.command
 def score(
     terminal: Terminal,
     model: options.StoredModel,
-    data: options.Data,
+    data: options.MaybeData = None,
+    job: Path | None = typer.Option(
+        None,
+        "--job",
+        metavar="FILE",
+        help="A motion to come (CSV, ROS 2, MoveIt, a log): the error to expect on it.",
+    ),
     output: Path | None = options.written("--output", "-o", help="File for the score (HDF5)."),
     held_out: options.OwnHeldOut = False,
     limits: Path | None = options.written(
@@ -37,9 +44,14 @@ def score(
     --thresholds: how large the residual of each joint may be, by speed and load, before a detector
     reports a collision; use fault-free runs.
 
-    Exit status 1: a run exceeds the model's tolerance.
+    --job: before the robot moves. Along a plan, or the motion of a log, how large an error of the
+    predicted torque is to be expected, and which joints go faster, or carry more, than in the data
+    that the model was made of.
+
+    Exit status 1: a run exceeds the model's tolerance; more error is to be expected than usual.
 
     Examples:
+      excite score diagnosis.h5 --job plan.csv
       excite score diagnosis.h5 measured.h5 -o week.h5
       excite score diagnosis.h5 measured.h5 --held-out
     """
@@ -47,6 +59,11 @@ def score(
     from excite_cli.api.scoring import score_answer, thresholds
     from excite_cli.api.working import working
 
+    if job is not None:
+        _forecast(terminal, model, job, data, output, limits)
+        return
+    if not data:
+        raise ConfigError("DATA: give measured data, or --job with a motion to come.")
     with (
         working(workers, scheduler, 1, terminal.tell) as place,
         terminal.live("score", len(data)) as line,
@@ -64,3 +81,13 @@ def score(
         if limits is not None:
             thresholds(model, data, false_alarms=false_alarms, output=limits, overwrite=overwrite)
     terminal.show(score_answer(found))
+
+
+def _forecast(
+    terminal: Terminal, model: Path, job: Path, data: list[Path] | None, *files: Path | None
+) -> None:
+    from excite_cli.api.forecasting import forecast, forecast_answer
+
+    if data or any(files):
+        raise ConfigError("--job: it takes no measured data, and writes no file. Run both in turn.")
+    terminal.show(forecast_answer(forecast(model, job, tell=terminal.tell)))

@@ -1,0 +1,83 @@
+"""What error of a model to expect on a motion to come, and where that leaves its own data."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from excite_cli.robot.model import Array
+from excite_cli.scoring.tolerance import TOLERATED
+from excite_cli.scoring.validity import Validity
+from excite_cli.shown.answer import Shown
+
+_FAR = 1.1  # times the speed or load of the model's own data: less is not outside
+_OFTEN = 0.01  # of the samples: fewer outside are not told
+
+
+@dataclass(frozen=True)
+class JointForecast:
+    """Of one joint over a job: RMS `torque` and expected `error` [N·m] (N).
+
+    `faster` and `heavier`: shares of the samples clearly beyond the speeds and loads of the model's
+    own data; `fastest`, `heaviest`: how many times these at most. NaN where the data say nothing.
+    """
+
+    torque: float
+    error: float
+    faster: float
+    heavier: float
+    fastest: float
+    heaviest: float
+
+    @property
+    def share(self) -> float:
+        """Expected error over torque."""
+        return self.error / self.torque if self.torque > 0.0 else float("nan")
+
+    @property
+    def outside(self) -> bool:
+        """Whether the job goes where the model's own data were not."""
+        return max(self.faster, self.heavier) > _OFTEN
+
+
+@dataclass(frozen=True, repr=False)
+class Forecast(Shown):
+    """The error to expect of `model` on the motion of the file `job`, `seconds` long.
+
+    `joints` by name; `made`: error when the model was made, on data held out, as a share of the
+    torque (None if not known). `torque_units` of the joints.
+    """
+
+    model: str
+    job: str
+    seconds: float
+    joints: dict[str, JointForecast]
+    made: float | None
+    torque_units: tuple[str, ...]
+
+    @property
+    def mean_share(self) -> float:
+        """Expected error over torque, mean over the joints of which it is known."""
+        known = [each.share for each in self.joints.values() if np.isfinite(each.share)]
+        return float(np.mean(known)) if known else float("nan")
+
+    @property
+    def outside(self) -> tuple[str, ...]:
+        """Joints that go where the model's own data were not."""
+        return tuple(name for name, each in self.joints.items() if each.outside)
+
+    @property
+    def good(self) -> bool:
+        """Whether the error to expect is about that of the model's own data."""
+        return self.made is None or not self.mean_share > TOLERATED * self.made
+
+
+def joint_forecasts(
+    validity: Validity, v: Array, load: Array, torque: Array, deviation: Array
+) -> list[JointForecast]:
+    """Of all joints, from speeds, rigid-body and whole torques and their deviation, all (T, n)."""
+    speeds, loads = validity.beyond(v, load)
+    rms = (np.sqrt(np.mean(np.square(x), axis=0)) for x in (torque, deviation))
+    shares = (np.mean(x > _FAR, axis=0) for x in (speeds, loads))
+    most = (x.max(axis=0) for x in (speeds, loads))
+    figures = np.stack([*rms, *shares, *most], axis=1)
+    return [JointForecast(*map(float, row)) for row in figures]
