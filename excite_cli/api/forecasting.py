@@ -45,9 +45,9 @@ def forecast(model: Model | str | Path, job: Motions, *, tell: Tell = log_note) 
         given.torque(series.q[:2], series.v[:2], series.a[:2], series.t[:2])  # it can be asked
         found = given.standing.predicted(stored.robot, series)
         deviation = trust.deviation(series, found.load)
-        parts.append((series.v, found.load, found.torque, deviation))
-    v, load, torque, deviation = (np.concatenate(part) for part in zip(*parts, strict=True))
-    joints = joint_forecasts(trust.validity, v, load, torque, deviation)
+        parts.append((series.q, series.v, found.load, found.torque, deviation))
+    along = (np.concatenate(part) for part in zip(*parts, strict=True))
+    joints = joint_forecasts(trust.validity, *along)
     return Forecast(
         str(stored.path),
         str(job) if isinstance(job, str | Path) else "",

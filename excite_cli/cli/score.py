@@ -45,8 +45,8 @@ def score(
     reports a collision; use fault-free runs.
 
     --job: before the robot moves. Along a plan, or the motion of a log, how large an error of the
-    predicted torque is to be expected, and which joints go faster, or carry more, than in the data
-    that the model was made of.
+    predicted torque is to be expected, and which joints go farther, faster, or carry more, than in
+    the data that the model was made of.
 
     Exit status 1: a run exceeds the model's tolerance; more error is to be expected than usual.
 

@@ -17,16 +17,19 @@ _OFTEN = 0.01  # of the samples: fewer outside are not told
 class JointForecast:
     """Of one joint over a job: RMS `torque` and expected `error` [N·m] (N).
 
-    `faster` and `heavier`: shares of the samples clearly beyond the speeds and loads of the model's
-    own data; `fastest`, `heaviest`: how many times these at most. NaN where the data say nothing.
+    `faster`, `heavier` and `farther`: shares of the samples clearly beyond the speeds, loads and
+    positions of the model's own data; `fastest`, `heaviest`, `farthest`: how many times these at
+    most, positions from the middle of the own ones. NaN where the data say nothing.
     """
 
     torque: float
     error: float
     faster: float
     heavier: float
+    farther: float
     fastest: float
     heaviest: float
+    farthest: float
 
     @property
     def share(self) -> float:
@@ -36,7 +39,7 @@ class JointForecast:
     @property
     def outside(self) -> bool:
         """Whether the job goes where the model's own data were not."""
-        return max(self.faster, self.heavier) > _OFTEN
+        return max(self.faster, self.heavier, self.farther) > _OFTEN
 
 
 @dataclass(frozen=True, repr=False)
@@ -72,12 +75,12 @@ class Forecast(Shown):
 
 
 def joint_forecasts(
-    validity: Validity, v: Array, load: Array, torque: Array, deviation: Array
+    validity: Validity, q: Array, v: Array, load: Array, torque: Array, deviation: Array
 ) -> list[JointForecast]:
-    """Of all joints, from speeds, rigid-body and whole torques and their deviation, all (T, n)."""
-    speeds, loads = validity.beyond(v, load)
+    """Of all joints, from states, rigid-body and whole torques and their deviation, all (T, n)."""
+    beyond = (*validity.beyond(v, load), validity.away(q))
     rms = (np.sqrt(np.mean(np.square(x), axis=0)) for x in (torque, deviation))
-    shares = (np.mean(x > _FAR, axis=0) for x in (speeds, loads))
-    most = (x.max(axis=0) for x in (speeds, loads))
+    shares = (np.mean(x > _FAR, axis=0) for x in beyond)
+    most = (x.max(axis=0) for x in beyond)
     figures = np.stack([*rms, *shares, *most], axis=1)
     return [JointForecast(*map(float, row)) for row in figures]

@@ -42,10 +42,10 @@ def _sentence(found: Forecast) -> str:
     made = "" if found.made is None else f" ({percent(found.made)} on its own held-out data)"
     told = f"Expect an error of {percent(found.mean_share)} of the torque{made}."
     if not found.outside:
-        return f"{told} All joints stay within the speeds and loads of the model's data."
+        return f"{told} All joints stay within the positions, speeds and loads of the model's data."
     more = len(found.outside) - _NAMED
     named = ", ".join(found.outside[:_NAMED]) + (f" and {more} more" if more > 0 else "")
-    return f"{told} Beyond the speeds or loads of the model's data: {named}."
+    return f"{told} Beyond the positions, speeds or loads of the model's data: {named}."
 
 
 def _outside(joint: JointForecast) -> str:
@@ -56,6 +56,7 @@ def _outside(joint: JointForecast) -> str:
         for what, share, most in (
             ("faster", joint.faster, joint.fastest),
             ("more load", joint.heavier, joint.heaviest),
+            ("other positions", joint.farther, joint.farthest),
         )
         if share > 0.0
     ]

@@ -1,0 +1,114 @@
+"""The standard deviation of a predicted torque: where the data are, outside of them, by parameters.
+
+Residuals drawn with a known size; the covariance of a fit; and a motion that took no part.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from excite_cli.api.model import Model
+from excite_cli.dynamics.base_parameters import find_base_parameters
+from excite_cli.dynamics.rigid_body import RigidBody
+from excite_cli.errors import ConfigError
+from excite_cli.identification.regression import Series, effect_columns, signals_of, with_effects
+from excite_cli.identification.torque_trace import TorqueTrace
+from excite_cli.robot.model import Array
+from excite_cli.scoring.validity import Trust, validity_of
+from excite_cli.store.fit_file import read_fit
+from tests.api.conftest import Loop
+from tests.api.conftest import loop as loop
+
+RNG = np.random.default_rng(5)
+SIZE = 2000
+
+
+def trace(size: Array | float, held_out: bool = False) -> TorqueTrace:
+    """Speeds up to 1 rad/s, loads up to 10 N·m; a residual of `size` (SIZE,) on joint 1 of 2."""
+    v = RNG.uniform(-1.0, 1.0, (SIZE, 2))
+    load = RNG.uniform(-10.0, 10.0, (SIZE, 2))
+    left = np.stack([size * RNG.normal(size=SIZE), 0.1 * RNG.normal(size=SIZE)], axis=1)
+    t = 0.01 * np.arange(SIZE)
+    every = np.ones((SIZE, 2), dtype=bool)
+    return TorqueTrace("run", held_out, t, v, v, v, load, load + left, every, load)
+
+
+def deviation(traces: list[TorqueTrace], v: float, load: float, d: float = 0.0) -> Array:
+    at = np.ones((1, 2))
+    return validity_of(traces).deviation(v * at, load * at, d * at)[0]
+
+
+def test_it_follows_what_is_left_over_speed_and_load() -> None:
+    made = trace(0.0)
+    size = np.sqrt(0.04 + np.square(made.v[:, 0]) + 0.01 * np.square(made.load[:, 0]))
+    left = size * RNG.normal(size=SIZE)
+    made = replace(made, measured=made.predicted + np.stack([left, 0.1 + 0 * left], axis=1))
+    for v, load in ((0.1, 1.0), (0.9, 1.0), (0.1, 9.0), (0.9, 9.0)):
+        expected = np.sqrt((np.mean(size**2) + 0.04 + v**2 + 0.01 * load**2) / 2)
+        assert deviation([made], v, load) == pytest.approx([expected, 0.1], rel=0.1)
+
+
+def test_outside_of_the_data_it_grows_with_the_distance_and_by_parameters_everywhere() -> None:
+    made = [trace(0.2)]
+    inside = deviation(made, 0.5, 5.0)
+    assert deviation(made, 3.0, 5.0)[0] > 2.9 * inside[0]
+    assert deviation(made, 0.5, 40.0)[0] > 3.9 * inside[0]
+    assert deviation(made, 0.5, 5.0, d=1.0) == pytest.approx(np.hypot(inside, 1.5))
+    speeds, loads = validity_of(made).beyond(np.full((1, 2), 2.0), np.full((1, 2), 5.0))
+    assert speeds == pytest.approx(np.full((1, 2), 2.0), rel=0.05)
+    assert loads == pytest.approx(np.full((1, 2), 0.5), rel=0.05)
+    away = validity_of(made).away(np.array([[0.0, 2.0]]))
+    assert away == pytest.approx(np.array([[0.0, 2.0]]), abs=0.05)
+
+
+def test_what_is_left_of_held_out_data_counts_where_it_is_more() -> None:
+    same = deviation([trace(0.2), trace(0.1, held_out=True)], 0.5, 5.0)
+    more = deviation([trace(0.2), trace(0.6, held_out=True)], 0.5, 5.0)
+    assert same[0] == pytest.approx(np.sqrt((0.04 + 0.01) / 2), rel=0.1)
+    assert more[0] == pytest.approx(0.6, rel=0.1)
+    assert more[1] == pytest.approx(0.1, rel=0.1)
+
+
+def test_of_joints_without_samples_nothing_is_known() -> None:
+    made = trace(0.2)
+    made = replace(made, counted=made.counted & [False, True])
+    assert np.isnan(deviation([made], 0.5, 5.0)).tolist() == [True, False]
+
+
+def test_parameters_count_by_their_covariance(loop: Loop) -> None:
+    model = Model.load(loop.fit)
+    robot, own, fit = model.made.robot, model.made.model, read_fit(loop.fit).fit
+    q, v, a = robot.draw_states(50, seed=3)
+    series = Series(0.01 * np.arange(50), q, v, a)
+    base = find_base_parameters(robot)
+    signals = with_effects(signals_of(series, robot, own.phi), own.effects, own.values)
+    regressor = RigidBody(robot, own.phi, q, v, a).regressor[:, :, base.selection]
+    columns = np.concatenate([regressor, effect_columns(own.effects, signals)], axis=2)
+    known = np.isfinite(np.diag(fit.covariance))
+    assert known.all()
+    expected = np.sqrt(np.einsum("tjp,pq,tjq->tj", columns, fit.covariance, columns))
+    found = Trust(model.made).by_parameters(series)
+    # The prior of the bodies narrows the covariance a little.
+    assert np.all(found < 1.001 * expected)
+    assert np.median(found / expected) > 0.9
+
+
+def test_models_say_it_beside_the_torque(loop: Loop) -> None:
+    model = Model.load(loop.fit)
+    q, v, a = model.made.robot.draw_states(7, seed=1)
+    torque, std = model.torque(q, v, a, std=True)
+    assert torque == pytest.approx(model.torque(q, v, a))
+    assert std.shape == torque.shape
+    assert (std > 0.0).all()
+    one, its = model.torque(q[0], v[0], a[0], std=True)
+    assert one.shape == its.shape == (2,)
+    assert its == pytest.approx(std[0])
+
+
+def test_without_a_residual_it_is_refused(loop: Loop) -> None:
+    model = Model.load(loop.fit)
+    bare = Model(replace(model.made, path=Path("a.yaml"), traces=()))
+    with pytest.raises(ConfigError, match=r"a\.yaml does not say what it left of its own data\."):
+        bare.torque(*np.zeros((3, 2)), std=True)
