@@ -11,6 +11,7 @@ from excite_cli.api.motions import Motions, load_motions
 from excite_cli.identification.regression import Series
 from excite_cli.identification.torque_trace import torque_units
 from excite_cli.scoring.forecast import Forecast, joint_forecasts
+from excite_cli.scoring.validity import Trust
 from excite_cli.shown.note import Tell, log_note
 from excite_cli.summary.forecast import forecast_answer as forecast_answer
 from excite_cli.trajectory.fade import Segment
@@ -35,7 +36,7 @@ def forecast(model: Model | str | Path, job: Motions, *, tell: Tell = log_note) 
     """
     given = model if isinstance(model, Model) else load_model(model)
     stored = given.made
-    trust = given.trust
+    trust, model_of_all_runs = Trust(stored), stored.model.without(given.left_out)
     case = Case(stored.spec, stored.folder, stored.robot)
     motions = load_motions(case, job, tell=tell)
     seconds = sum(each.trajectory.duration for each in motions)
@@ -43,7 +44,7 @@ def forecast(model: Model | str | Path, job: Motions, *, tell: Tell = log_note) 
     for each in motions:
         series = _series(each, min(_RATE, _MOST / seconds))
         given.torque(series.q[:2], series.v[:2], series.a[:2], series.t[:2])  # it can be asked
-        found = given.standing.predicted(stored.robot, series)
+        found = model_of_all_runs.predicted(stored.robot, series)
         deviation = trust.deviation(series, found.load)
         parts.append((series.q, series.v, found.load, found.torque, deviation))
     along = (np.concatenate(part) for part in zip(*parts, strict=True))

@@ -65,7 +65,7 @@ class Model(Shown):
     @property
     def effects(self) -> tuple[Effect, ...]:
         """The effects that are in its torque."""
-        return self.standing.effects
+        return self._standing.effects
 
     @property
     def left_out(self) -> tuple[Effect, ...]:
@@ -85,7 +85,7 @@ class Model(Shown):
         them. A floating base is free. Least squares alone finds bodies that cannot be, for which
         forward dynamics fails: take `consistent`.
         """
-        found, left = pinocchio_model(self.made.robot, self.standing)
+        found, left = pinocchio_model(self.made.robot, self._standing)
         if words := in_words(left, self.joint_names):
             tell(Note(Level.WARNING, f"pin.rnea leaves out: {words}. Model.torque has all"))
         return found
@@ -112,7 +112,7 @@ class Model(Shown):
             return load_mujoco().MjModel.from_xml_string(exported.text)
 
     @property
-    def standing(self) -> IdentifiedModel:
+    def _standing(self) -> IdentifiedModel:
         """The model without effects of single recordings."""
         return self.made.model.without(self.left_out)
 
@@ -170,15 +170,15 @@ class Model(Shown):
             that does not say what it left of its own data.
         """
         series, single = self._series(q, v, a, t, covariates, start)
-        found = self.standing.predicted(self.made.robot, series)
+        found = self._standing.predicted(self.made.robot, series)
         torque = found.torque[0] if single else found.torque
         if not std:
             return torque
-        deviation = self.trust.deviation(series, found.load)
+        deviation = self._trust.deviation(series, found.load)
         return torque, deviation[0] if single else deviation
 
     @cached_property
-    def trust(self) -> Trust:
+    def _trust(self) -> Trust:
         """Where its torque is how exact; ConfigError where it keeps no residual of its own data."""
         return Trust(self.made)
 
@@ -189,7 +189,7 @@ class Model(Shown):
         """
         q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
         series, single = self._series(q, v, np.zeros_like(q), None, None, 0.0, check=False)
-        robot, model = self.made.robot, self.standing
+        robot, model = self.made.robot, self._standing
         body = RigidBody(robot, model.phi + model.carried(robot), series.q, 0 * series.v, series.a)
         carried = (
             body.load if load is None else np.asarray(load, dtype=float).reshape(series.q.shape)
@@ -223,7 +223,7 @@ class Model(Shown):
         flat = [effect.kind for effect in self.effects if _without_slope(effect)]
         if flat:
             raise ConfigError(f"no derivatives: {', '.join(dict.fromkeys(flat))} has none.")
-        found = self.standing.pull_back(self.made.robot, series, w)
+        found = self._standing.pull_back(self.made.robot, series, w)
         return tuple(each[0] if single else each for each in found)  # type: ignore[return-value]
 
     def derivatives(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:

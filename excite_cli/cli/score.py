@@ -51,7 +51,7 @@ def score(
     Exit status 1: a run exceeds the model's tolerance; more error is to be expected than usual.
 
     Examples:
-      excite score diagnosis.h5 --job plan.csv
+      excite score diagnosis.h5 --job ur10.h5
       excite score diagnosis.h5 measured.h5 -o week.h5
       excite score diagnosis.h5 measured.h5 --held-out
     """

@@ -183,3 +183,23 @@ def test_a_config_without_numbers_is_the_urdf(days: Program) -> None:
     config.write_text(robot)
     told = days.good("score", config, "sound.h5").stderr
     assert "does not state how large its own errors were" in told.replace("\n", " ")
+
+
+def test_a_job_is_forecast_before_it_is_played(days: Program, two_motions: Run) -> None:
+    told = days.good("score", "fit.h5", "--job", str(two_motions.path)).stdout
+    assert told.startswith("Expect an error of ")
+    assert "on its own held-out data" in told
+    found = days.answer("score", "fit.h5", "--job", "sound.h5")
+    assert set(found["joints"]["elbow"]) >= {"torque", "error", "faster", "heavier"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("score", "fit.h5"), "DATA: give measured data, or --job"),
+        (("score", "fit.h5", "sound.h5", "--job", "sound.h5"), "--job: it takes no measured data"),
+        (("score", "fit.h5", "--job", "none.csv"), "none.csv"),
+    ],
+)
+def test_bad_jobs(days: Program, arguments: tuple[str, ...], told: str) -> None:
+    assert told in days.refused(*arguments)
