@@ -28,6 +28,7 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.errors import ConfigError
 from excite_cli.identification.errors_of_torque import FEWEST
+from excite_cli.identification.factors import triangle_of
 from excite_cli.identification.regression import (
     Series,
     effect_columns,
@@ -37,6 +38,7 @@ from excite_cli.identification.regression import (
 from excite_cli.identification.stored_model import StoredModel
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.identification.uncertain_model import from_information
+from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array
 from excite_cli.scoring.thresholds import speed_and_load_squares, squares_of
 
@@ -115,8 +117,8 @@ class Trust:
                 "identify -o) or the diagnosis (excite diagnose -o) itself."
             )
         self._robot, self._model = stored.robot, stored.model
-        self._root = _root_of(stored)
         self.validity = validity_of(stored.traces)
+        self._root = self._root_of(stored)
 
     def deviation(self, series: Series, load: Array) -> Array:
         """s (T, n) [N·m] (N) of the torque, beside the model's `load` (T, n)."""
@@ -127,9 +129,7 @@ class Trust:
         if self._root is None:
             return np.zeros_like(series.q)
         robot, model = self._robot, self._model
-        signals = signals_of(series, robot, model.phi)
-        signals = with_effects(signals, model.effects, model.values)
-        effects = effect_columns(model.effects, signals)
+        effects = self._effects(series)
         found = np.empty_like(series.q)
         for start in range(0, len(found), _AT_ONCE):
             part = slice(start, start + _AT_ONCE)
@@ -138,10 +138,34 @@ class Trust:
             found[part] = np.sqrt(np.square(columns @ self._root).sum(axis=2))
         return found
 
+    def _effects(self, series: Series) -> Array:
+        """Columns (T, n, k) of the effects."""
+        signals = signals_of(series, self._robot, self._model.phi)
+        signals = with_effects(signals, self._model.effects, self._model.values)
+        return effect_columns(self._model.effects, signals)
 
-def _root_of(stored: StoredModel) -> Array | None:
-    """B (P + k, m) of the covariance B Bᵀ; None where it is not known."""
-    if stored.factor is None:
-        return None
-    base, cad = find_base_parameters(stored.robot), standard_parameters(stored.robot)
-    return from_information(base, inertial_prior(stored.robot, cad, UNSURE), stored.factor)
+    def _root_of(self, stored: StoredModel) -> Array | None:
+        """B (P + k, m) of the covariance B Bᵀ; None where it is not known.
+
+        Nor where effects follow a column of the log, which traces do not keep.
+        """
+        if stored.factor is None or any(effect.covariate for effect in stored.model.effects):
+            return None
+        base, cad = find_base_parameters(stored.robot), standard_parameters(stored.robot)
+        rows = np.pad(np.diag(self._usual(stored.traces)), ((0, 0), (base.rank, 0)))
+        factor = triangle_of(np.vstack([stored.factor, rows]))
+        return from_information(base, inertial_prior(stored.robot, cad, UNSURE), factor)
+
+    def _usual(self, traces: Sequence[TorqueTrace]) -> Array:
+        """1 (k,) over the sizes of effects that make all torque of a joint in the own data.
+
+        None is more. Where dry friction of a joint and of the gears that it shares with another
+        were one number of two, 1.7 kN·m were said of a torque of 2 N·m.
+        """
+        columns, torque = 0.0, 0.0
+        for each in traces:
+            series = Series(each.t, each.q, each.v, each.a, RunId(each.run))
+            columns = columns + np.square(self._effects(series)).sum(axis=0)
+            torque = torque + np.square(np.nan_to_num(each.measured)).sum(axis=0)
+        share = np.asarray(columns) / np.maximum(np.asarray(torque), 1e-300)[:, None]
+        return np.asarray(np.sqrt(share.max(axis=0, initial=0.0)))
