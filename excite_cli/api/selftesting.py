@@ -12,8 +12,8 @@ import numpy as np
 from excite_cli.api.arguments import checked
 from excite_cli.api.diagnosing import diagnose
 from excite_cli.api.inspecting import bare_problem
-from excite_cli.api.loading import Case, inputs_of, measured_case
-from excite_cli.api.motions import Motions, load_motions
+from excite_cli.api.loading import Case, inputs_of, load_data, measured_case
+from excite_cli.api.motions import Motions, is_motion, load_motions
 from excite_cli.api.simulating import configured_drive, simulate
 from excite_cli.config.load_spec import spec_as_yaml
 from excite_cli.diagnosis.expectation import rows_as_recorded
@@ -27,10 +27,14 @@ from excite_cli.errors import ConfigError, ExciteError, FileError, RobotError
 from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
 from excite_cli.given_files import refuse_inputs_as_outputs
+from excite_cli.measurement.dataset import Dataset
 from excite_cli.shown.note import Level, Note, Tell, log_note, never, unheard
 from excite_cli.simulation.ground_truth import PlantedEffect, parse_planted
 from excite_cli.simulation.mujoco_model import load_mujoco
 from excite_cli.simulation.settings import SimulationSettings
+from excite_cli.store.diagnosis_file import is_diagnosis
+from excite_cli.store.fit_file import is_fit
+from excite_cli.store.result_file import is_result
 from excite_cli.study.case import DoneCase, StudyCase
 from excite_cli.study.records import TABLE, StudyNews, files_of
 from excite_cli.study.records import run_study as run_cases
@@ -46,7 +50,6 @@ from excite_cli.study.selftest import (
 )
 from excite_cli.summary.selftest import selftest_answer as selftest_answer
 from excite_cli.trajectory.fade import Segment
-from excite_cli.trajectory.sampled import SampledTrajectory
 from excite_cli.workers.base import Workers
 
 _SURE = (HeldOutVerdict.CONFIRMED, HeldOutVerdict.WEIGHED)
@@ -102,8 +105,9 @@ def selftest(
         raise ConfigError("--resume goes on with the folder of -o, --overwrite replaces it.")
     load_mujoco()
     case = _testable(problem)
-    segments = tuple(load_motions(case, motions, (), tell))
-    settings = settings or usual_settings(case, segments)
+    played = read_motions(case, motions, tell)
+    segments = tuple(load_motions(case, played, (), tell))
+    settings = settings or usual_settings(case, played)
     declared = declared_effects(case.spec.effects, replace(case.robot, rows=case.robot.moved))
     asked = _asked(case, effects, declared, settings.seed)
     chosen = spread(asked, len(asked) if cases is None else cases, settings.seed)
@@ -132,24 +136,29 @@ def selftest(
 
 
 @checked("motions")
-def usual_settings(problem: Problem | Case, motions: Motions) -> SimulationSettings:
-    """The seed and the drive of the config; samples as often as measured `motions` have them.
+def read_motions(problem: Problem | Case, motions: Motions, tell: Tell = log_note) -> Motions:
+    """Measured data read from their file; all other motions as they are given.
 
     Raises
     ------
-    FileError
-        The motions are of another robot, or cannot be read.
+    FileError, ConfigError, MissingExtraError
+        See `load_data`.
     """
+    if not isinstance(motions, str | Path):
+        return motions
+    path = Path(motions)
+    own = path.is_file() and any(it(path) for it in (is_result, is_fit, is_diagnosis))
+    return motions if own or is_motion(path, problem.spec) else load_data(problem, path, tell)
+
+
+@checked("motions")
+def usual_settings(problem: Problem | Case, motions: Motions) -> SimulationSettings:
+    """The seed and the drive of the config; samples as often as measured `motions` have them."""
     plain = SimulationSettings()
-    sampled = [
-        each.trajectory.knots
-        for each in load_motions(problem, motions, (), unheard)
-        if isinstance(each.trajectory, SampledTrajectory)
-    ]
-    steps = [float(np.median(np.diff(knots))) for knots in sampled]
-    rate = min(1.0 / min(steps), plain.control_rate) if steps else plain.rate
-    drive = configured_drive(problem)
-    return replace(plain, seed=problem.spec.seed, rate=rate, drive=drive)
+    data = read_motions(problem, motions, unheard)
+    steps = [np.median(np.diff(run.t)) for run in data.runs] if isinstance(data, Dataset) else []
+    rate = min(1.0 / float(min(steps)), plain.control_rate) if steps else plain.rate
+    return replace(plain, seed=problem.spec.seed, rate=rate, drive=configured_drive(problem))
 
 
 def do_case(task: _Task, case: StudyCase, tell: Callable[[str], None]) -> DoneCase:

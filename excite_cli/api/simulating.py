@@ -60,10 +60,10 @@ def simulate(
     """Play motions on a MuJoCo robot that differs from its model: `excite simulate`.
 
     `effects` are put into the robot, records or `kind@joint=value[,name:value…]`; with `declared`
-    those of the config too, in sizes of their own. `chosen` are motions of a result by their
-    index. With `start` (position by joint [rad, m], the others at robot.posture; {}: all of them) the robot
-    enters each motion from rest there and goes back, within all constraints. Written to `output`
-    (HDF5) if that is given. `progress(run, done, total)` is called before every run.
+    those of the config too, in sizes of their own. `chosen` are motions of a result by their index.
+    With `start` (position by joint [rad, m], the others at robot.posture; {}: all of them) the
+    robot enters each motion from rest there and goes back, within all constraints. Written to
+    `output` (HDF5) if that is given. `progress(run, done, total)` is called before every run.
 
     Returns
     -------

@@ -78,7 +78,12 @@ def selftest(
       excite selftest ur10.yaml measured.h5 --cases 2 -o tested
     """
     from excite_cli.api.loading import load_case
-    from excite_cli.api.selftesting import StudyNews, selftest_answer, usual_settings
+    from excite_cli.api.selftesting import (
+        StudyNews,
+        read_motions,
+        selftest_answer,
+        usual_settings,
+    )
     from excite_cli.api.selftesting import selftest as test_motions
     from excite_cli.api.working import working
 
@@ -88,7 +93,8 @@ def selftest(
         answer_so_far(lambda: terminal.say(_ASKED)) as ended,
     ):
         case = load_case(config, overrides or ())
-        given = usual_settings(case, motions)
+        played = read_motions(case, motions, terminal.tell)
+        given = usual_settings(case, played)
         settings = replace(
             given,
             seed=given.seed if seed is None else seed,
@@ -104,7 +110,7 @@ def selftest(
 
         found = test_motions(
             case,
-            motions,
+            played,
             effect or (),
             settings,
             cases=cases,
