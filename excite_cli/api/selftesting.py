@@ -107,10 +107,15 @@ def selftest(
     case = _testable(problem)
     played = read_motions(case, motions, tell)
     segments = tuple(load_motions(case, played, (), tell))
+    if len(segments) == 1:
+        text = "there is one motion, of which parts are held out; another one is a harder test"
+        tell(Note(Level.HINT, text))
     settings = settings or usual_settings(case, played)
     declared = declared_effects(case.spec.effects, replace(case.robot, rows=case.robot.moved))
     asked = _asked(case, effects, declared, settings.seed)
-    chosen = spread(asked, len(asked) if cases is None else cases, settings.seed)
+    chosen = asked
+    if cases is not None or not effects:
+        chosen = spread(asked, len(asked) if cases is None else cases, settings.seed)
     planted = {_slug(case, each): (each, *beside(each, case.robot, declared)) for each in chosen}
     power = _predicted(case, segments, chosen, tell)
     task = _Task(case, segments, settings, planted, dict(zip(planted, power, strict=True)))
@@ -132,7 +137,7 @@ def selftest(
     failed = {each.message for each in found}
     if found and len(failed) == 1 and "" not in failed:
         raise FileError(f"every case failed: {failed.pop()}")
-    return Selftest(case.robot.name, found, len(every))
+    return Selftest(case.robot.name, names, found, len(every))
 
 
 @checked("motions")

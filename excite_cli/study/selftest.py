@@ -121,7 +121,7 @@ def beside(planted: PlantedEffect, robot: Robot, declared: Sequence[Effect]) -> 
 
 
 def spread(effects: Sequence[PlantedEffect], count: int, seed: int) -> list[PlantedEffect]:
-    """So many of the effects, spread over kinds and joints; which of them, `seed` decides."""
+    """So many of the effects, in an order that spreads them over kinds and joints, by `seed`."""
     order = [effects[k] for k in np.random.default_rng([seed, 3]).permutation(len(effects))]
     chosen: list[PlantedEffect] = []
     while order and len(chosen) < count:
@@ -132,7 +132,7 @@ def spread(effects: Sequence[PlantedEffect], count: int, seed: int) -> list[Plan
         )
         order = [each for each in order if each is not best]
         chosen.append(best)
-    return [each for each in effects if any(each is it for it in chosen)]
+    return chosen
 
 
 @dataclass(frozen=True)
@@ -165,9 +165,13 @@ class SelftestCase:
 
 @dataclass(frozen=True, repr=False)
 class Selftest(Shown):
-    """What a diagnosis makes of each planted effect: `cases` that were done, of `asked`."""
+    """What a diagnosis makes of each planted effect: `cases` that were done, of `asked`.
+
+    `joint_names` (n,) of the `robot`.
+    """
 
     robot: str
+    joint_names: tuple[str, ...]
     cases: tuple[SelftestCase, ...]
     asked: int
 

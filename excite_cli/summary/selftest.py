@@ -51,19 +51,22 @@ def in_words(found: Selftest) -> str:
     text += f"; {left} not tried: stopped before" if left else ""
     known = [case for case in found.cases if not isnan(case.power) and case.outcome is not None]
     if known:
-        text += f". Predicted: {sum(case.power for case in known):.1f} of the {len(known)} "
-        text += f"with a prediction would be named, {_given_away(known)} are found or confounded"
+        text += (
+            f". Of {len(known)} with a predicted power, {sum(case.power for case in known):.1f} "
+            f"were predicted to be named and {_count(known)} are found"
+        )
     return f"{text}."
 
 
-def _given_away(cases: list[SelftestCase]) -> int:
-    return sum(case.outcome in (Outcome.FOUND, Outcome.CONFOUNDED) for case in cases)
+def _count(cases: list[SelftestCase]) -> int:
+    return sum(case.outcome is Outcome.FOUND for case in cases)
 
 
 def _overview(found: Selftest) -> Table:
     """A row per kind, a column per joint."""
-    places = list(dict.fromkeys(_place(case) for case in found.cases))
-    kinds = dict.fromkeys(case.kind for case in found.cases)
+    by_joint = sorted(found.cases, key=lambda case: found.joint_names.index(case.joints[0]))
+    places = list(dict.fromkeys(map(_place, by_joint)))
+    kinds = sorted({case.kind for case in found.cases})
     rows = []
     for kind in kinds:
         letters = dict.fromkeys(places, "")
@@ -75,7 +78,7 @@ def _overview(found: Selftest) -> Table:
 
 
 def _cases(found: Selftest) -> Table:
-    rows = tuple(_row(case) for case in found.cases)
+    rows = tuple(_row(case) for case in sorted(found.cases, key=lambda it: (it.kind, it.joints)))
     names = (
         "effect", "where", "outcome", "planted", "found ± std", "unit", "power", "before", "after",
         "confirmed",
