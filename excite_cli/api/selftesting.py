@@ -1,21 +1,20 @@
 """Whether a robot's motions would give away what its model lacks: `excite selftest`."""
 
-import hashlib
 import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from excite_cli.api.arguments import checked
 from excite_cli.api.diagnosing import diagnose
 from excite_cli.api.inspecting import bare_problem
-from excite_cli.api.loading import Case, inputs_of, load_data, measured_case
+from excite_cli.api.loading import Case, load_data, measured_case
 from excite_cli.api.motions import Motions, is_motion, load_motions
 from excite_cli.api.simulating import configured_drive, simulate
-from excite_cli.config.load_spec import spec_as_yaml
 from excite_cli.diagnosis.expectation import rows_as_recorded
 from excite_cli.diagnosis.power import power_of
 from excite_cli.diagnosis.records import Diagnosis, NamedEffect
@@ -26,28 +25,17 @@ from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import ConfigError, ExciteError, FileError, RobotError
 from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
-from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.shown.note import Level, Note, Tell, log_note, never, unheard
 from excite_cli.simulation.ground_truth import PlantedEffect, parse_planted
 from excite_cli.simulation.mujoco_model import load_mujoco
 from excite_cli.simulation.settings import SimulationSettings
-from excite_cli.store.diagnosis_file import is_diagnosis
-from excite_cli.store.fit_file import is_fit
 from excite_cli.store.result_file import is_result
-from excite_cli.study.case import DoneCase, StudyCase
-from excite_cli.study.records import TABLE, StudyNews, files_of
+from excite_cli.study import selftest as judging
+from excite_cli.study.case import DoneCase, Figures, StudyCase
+from excite_cli.study.records import StudyNews
 from excite_cli.study.records import run_study as run_cases
-from excite_cli.study.selftest import (
-    Name,
-    Said,
-    Selftest,
-    beside,
-    case_of,
-    judge,
-    spread,
-    usual_effects,
-)
+from excite_cli.study.selftest import Name, Said, Selftest, SelftestCase
 from excite_cli.summary.selftest import selftest_answer as selftest_answer
 from excite_cli.trajectory.fade import Segment
 from excite_cli.workers.base import Workers
@@ -57,27 +45,22 @@ _SURE = (HeldOutVerdict.CONFIRMED, HeldOutVerdict.WEIGHED)
 
 @dataclass(frozen=True)
 class _Task:
-    """What all cases share: the robot, its motions, how it is simulated; by the name of a case what
-    is planted (the effect, then what comes with it), and the power predicted for it."""
+    """What cases share, and by their names what is planted: the effect, then what comes with it."""
 
     case: Case
     motions: tuple[Segment, ...]
     settings: SimulationSettings
-    planted: dict[str, tuple[PlantedEffect, ...]]
-    power: dict[str, float]
+    planted: dict[str, list[PlantedEffect]]
 
 
 @checked("motions")
 def selftest(
     problem: Problem | Case,
     motions: Motions,
-    effects: Sequence[str | PlantedEffect] = (),
+    effects: Sequence[str] = (),
     settings: SimulationSettings | None = None,
     *,
     cases: int | None = None,
-    output: str | Path | None = None,
-    resume: bool = False,
-    overwrite: bool = False,
     workers: Workers | None = None,
     progress: Callable[[StudyNews], None] = unheard,
     tell: Tell = log_note,
@@ -88,10 +71,8 @@ def selftest(
     Each of the `effects` (`kind@joint=value[,name:value…]`; none: those that many robots have, on
     every joint) is put into a simulated robot of its own, on top of those that the config declares;
     the robot plays all motions, and a diagnosis that holds the last one out is judged. At most
-    `cases` of them are tried, spread over kinds and joints. `settings`: of the simulation; by
-    default the seed of the config, and samples as often as measured motions have them. The folder
-    `output` keeps a record of every case, with which `resume` goes on. `ended` is asked before
-    every case: once it is true, the answer so far is it.
+    `cases` of them are tried, spread over kinds and joints. `settings`: `usual_settings` by
+    default. `ended` is asked before every case: once it is true, the answer so far is it.
 
     Raises
     ------
@@ -99,117 +80,89 @@ def selftest(
         An effect cannot be read or is declared; the config has what no simulated log has; the robot
         has no mass; MuJoCo is missing.
     FileError
-        The motions are of another robot; records are in the folder already.
+        The motions are of another robot.
     """
-    if (resume or overwrite) and (output is None or (resume and overwrite)):
-        raise ConfigError("--resume goes on with the folder of -o, --overwrite replaces it.")
     load_mujoco()
     case = _testable(problem)
-    played = read_motions(case, motions, tell)
-    segments = tuple(load_motions(case, played, (), tell))
-    if len(segments) == 1:
-        text = "there is one motion, of which parts are held out; another one is a harder test"
-        tell(Note(Level.HINT, text))
-    settings = settings or usual_settings(case, played)
-    declared = declared_effects(case.spec.effects, replace(case.robot, rows=case.robot.moved))
-    asked = _asked(case, effects, declared, settings.seed)
-    chosen = asked
-    if cases is not None or not effects:
-        chosen = spread(asked, len(asked) if cases is None else cases, settings.seed)
-    planted = {_slug(case, each): (each, *beside(each, case.robot, declared)) for each in chosen}
-    power = _predicted(case, segments, chosen, tell)
-    task = _Task(case, segments, settings, planted, dict(zip(planted, power, strict=True)))
+    segments = tuple(load_motions(case, motions, (), tell))
+    settings = settings or usual_settings(case, motions)
     names = case.robot.joint_names
-    digest = _digest(task)
-    every = [
-        StudyCase(
-            name, {"effect": first.in_words(names)}, None, f"{digest} {first.in_words(names)}"
-        )
-        for name, (first, *_) in planted.items()
-    ]
-    with tempfile.TemporaryDirectory() as spare:
-        folder = Path(spare) if output is None else Path(output)
-        written = [folder / TABLE, *(path for each in every for path in files_of(folder, each))]
-        present = {f"{path.name}:": path for path in written if path.exists()}
-        refuse_inputs_as_outputs(present, inputs_of(problem, motions))
-        done = run_cases(task, every, folder, do_case, workers, resume, progress, overwrite, ended)
-    found = tuple(case_of(each, planted[each.name][0], names) for each in done)
-    failed = {each.message for each in found}
-    if found and len(failed) == 1 and "" not in failed:
-        raise FileError(f"every case failed: {failed.pop()}")
-    return Selftest(case.robot.name, names, found, len(every))
-
-
-@checked("motions")
-def read_motions(problem: Problem | Case, motions: Motions, tell: Tell = log_note) -> Motions:
-    """Measured data read from their file; all other motions as they are given.
-
-    Raises
-    ------
-    FileError, ConfigError, MissingExtraError
-        See `load_data`.
-    """
-    if not isinstance(motions, str | Path):
-        return motions
-    path = Path(motions)
-    own = path.is_file() and any(it(path) for it in (is_result, is_fit, is_diagnosis))
-    return motions if own or is_motion(path, problem.spec) else load_data(problem, path, tell)
+    declared = declared_effects(case.spec.effects, replace(case.robot, rows=case.robot.moved))
+    chosen = _asked(case, effects, declared) if effects else []
+    if cases is not None or not effects:
+        usual = chosen or judging.usual_effects(case.robot, declared, settings.seed)
+        chosen = judging.spread(usual, cases or len(usual), settings.seed)
+    planted = {it.in_words(names): [it, *judging.beside(it, case.robot, declared)] for it in chosen}
+    power = dict(zip(planted, _predicted(case, segments, chosen, tell), strict=True))
+    task = _Task(case, segments, settings, planted)
+    every = [StudyCase(f"case {k}", {"effect": it}, None, it) for k, it in enumerate(planted)]
+    with tempfile.TemporaryDirectory() as folder:
+        done = run_cases(task, every, Path(folder), do_case, workers, report=progress, ended=ended)
+    if done and done[0].failed and len({each.message for each in done}) == 1:
+        raise FileError(f"every case failed: {done[0].message}")
+    found = []
+    for record in done:
+        words = record.values["effect"]
+        one = planted[words][0]
+        size, (kind, joints) = one.named()[one.number], _name(one, names)
+        told: dict[str, Any] = {**record.figures, "message": record.message}
+        told |= {"power": power[words], "seconds": record.seconds}
+        found.append(SelftestCase(words, kind, joints, size, **told))
+    return Selftest(case.robot.name, names, tuple(found), len(every))
 
 
 @checked("motions")
 def usual_settings(problem: Problem | Case, motions: Motions) -> SimulationSettings:
-    """The seed and the drive of the config; samples as often as measured `motions` have them."""
-    plain = SimulationSettings()
-    data = read_motions(problem, motions, unheard)
-    steps = [np.median(np.diff(run.t)) for run in data.runs] if isinstance(data, Dataset) else []
-    rate = min(1.0 / float(min(steps)), plain.control_rate) if steps else plain.rate
-    return replace(plain, seed=problem.spec.seed, rate=rate, drive=configured_drive(problem))
+    """Seed and drive of the config, and as many samples a second as measured `motions` have."""
+    rate = SimulationSettings.rate
+    file = Path(motions) if isinstance(motions, str | Path) else None
+    if file is not None and not (is_result(file) or is_motion(file, problem.spec)):
+        motions = load_data(problem, file, unheard)
+    if isinstance(motions, Dataset):
+        rate = min(1000.0, *(1.0 / float(np.median(np.diff(run.t))) for run in motions.runs))
+    return SimulationSettings(problem.spec.seed, rate, drive=configured_drive(problem))
 
 
 def do_case(task: _Task, case: StudyCase, tell: Callable[[str], None]) -> DoneCase:
     """One case, on whatever worker: simulate, diagnose, judge."""
     began = time.perf_counter()
-    planted, *more = task.planted[case.name]
+    planted = task.planted[case.values["effect"]]
     tell("simulating")
-    played = simulate(task.case, task.motions, (planted, *more), task.settings, tell=unheard)
-    found = diagnose(
-        task.case, played.dataset, progress=lambda text, done: tell(text), tell=unheard
-    )
-    figures = _figures(found, planted, more, task)
-    if np.isfinite(task.power[case.name]):
-        figures["power"] = task.power[case.name]
-    return DoneCase(figures, {}, time.perf_counter() - began)
+    words = [each.in_words(task.case.robot.joint_names) for each in planted]
+    data = simulate(task.case, task.motions, words, task.settings, tell=unheard).dataset
+    found = diagnose(task.case, data, progress=lambda text, done: tell(text), tell=unheard)
+    return DoneCase(_figures(found, planted, task.case), {}, time.perf_counter() - began)
 
 
-def _figures(
-    found: Diagnosis, planted: PlantedEffect, more: Sequence[PlantedEffect], task: _Task
-) -> dict[str, float | int | str | None]:
-    robot = task.case.robot
-    own, *others = (
-        Name(each.effect.kind, tuple(robot.joint_names[j] for j in each.effect.joints))
-        for each in (planted, *more)
-    )
+def _figures(found: Diagnosis, planted: Sequence[PlantedEffect], case: Case) -> Figures:
+    one, robot = planted[0], case.robot
+    own, *others = (_name(each, robot.joint_names) for each in planted)
     said = [_said(found, each) for each in found.effects]
-    absorbed = [Name(each.kind, each.joints) for each in found.absorbed]
-    outcome, wrong = judge(own, said, others, absorbed)
-    sure = [str(each.name) for each in said if each.sure]
+    absorbed = [(each.kind, each.joints) for each in found.absorbed]
+    outcome, wrong = judging.judge(own, said, others, absorbed)
     figures: dict[str, float | int | str | None] = {
         "outcome": str(outcome),
-        "named": " ".join(sure),
-        "wrong": " ".join(map(str, wrong)),
+        "named": _listed([each.name for each in said if each.sure]),
+        "wrong": _listed(wrong),
         "before": found.before.mean_relative_moving,
         "after": found.after.mean_relative_moving,
     }
-    values = planted.effect.report_on(
-        robot.sliding, planted.values, np.zeros((len(planted.values),) * 2)
-    )
-    if planted.number in values:
-        figures["unit"] = values[planted.number].unit
+    nothing = np.zeros((len(one.values), len(one.values)))
+    values = one.effect.report_on(robot.sliding, one.values, nothing)
+    figures["unit"] = values[one.number].unit if one.number in values else ""
     for each in found.effects:
-        value = each.parameters.get(planted.number)
-        if Name(each.effect.kind, each.effect.joints) == own and value is not None:
-            figures |= {"found": value.value, "std": value.std, "unit": value.unit}
-    return {key: value for key, value in figures.items() if value == value}
+        value = each.parameters.get(one.number)
+        if (each.effect.kind, each.effect.joints) == own and value is not None:
+            figures |= {"found": value.value, "std": value.std}
+    return figures
+
+
+def _name(planted: PlantedEffect, joints: Sequence[str]) -> Name:
+    return planted.effect.kind, tuple(joints[j] for j in planted.effect.joints)
+
+
+def _listed(names: Sequence[Name]) -> str:
+    return ", ".join(f"{kind}@{'+'.join(joints)}" for kind, joints in names)
 
 
 def _said(found: Diagnosis, named: NamedEffect) -> Said:
@@ -218,26 +171,21 @@ def _said(found: Diagnosis, named: NamedEffect) -> Said:
     for line in found.friction_lines:
         if (line.joint,) == effect.joints and effect.kind in line.kinds and len(line.kinds) > 1:
             verdict = line.verdict
-    pairs = [each for each in found.joint_aliases if effect in each.named]
-    aliases = (*named.aliases, *(each for pair in pairs for each in pair.others))
-    return Said(
-        Name(effect.kind, effect.joints),
-        tuple(Name(each.kind, each.joints) for each in aliases),
-        verdict in _SURE,
-        named.approximates is not None,
-    )
+    pairs = [each.others for each in found.joint_aliases if effect in each.named]
+    aliases = tuple((each.kind, each.joints) for each in (*named.aliases, *sum(pairs, ())))
+    near = named.approximates is not None
+    return Said((effect.kind, effect.joints), aliases, verdict in _SURE, near)
 
 
 def _testable(problem: Problem | Case) -> Case:
     """The case without what only recorded runs have; refuses what cannot be simulated."""
-    spec = problem.spec
+    measured = measured_case(problem)
+    spec, robot = measured.spec, measured.robot
     if spec.measurement.covariates:
         raise ConfigError(
             "measurement.covariates: a selftest simulates no further columns of the log. Leave "
             "them out: --set 'measurement.covariates=[]'."
         )
-    measured = measured_case(problem)
-    robot = measured.robot
     if not standard_parameters(robot)[::10].sum() > 0.0:
         raise RobotError(
             f"{robot.name} has no masses, so nothing can be simulated. Give its links <inertial> "
@@ -246,40 +194,19 @@ def _testable(problem: Problem | Case) -> Case:
     return Case(spec.model_copy(update={"runs": {}}), measured.folder, robot, measured.file)
 
 
-def _asked(
-    case: Case, effects: Sequence[str | PlantedEffect], declared: Sequence[Effect], seed: int
-) -> list[PlantedEffect]:
-    """The effects to be planted, each on its own."""
-    if not effects:
-        return usual_effects(case.robot, declared, seed)
-    found: list[PlantedEffect] = []
-    for given in effects:
-        found += parse_planted(given, case.robot, {}) if isinstance(given, str) else [given]
-    there = {each.place for each in declared}
-    for each in found:
-        words = each.in_words(case.robot.joint_names)
-        if each.effect.place in there:
+def _asked(case: Case, effects: Sequence[str], declared: Sequence[Effect]) -> list[PlantedEffect]:
+    """The effects that were given, each to be planted on its own."""
+    found = [each for given in effects for each in parse_planted(given, case.robot, {})]
+    every = [each.in_words(case.robot.joint_names) for each in found]
+    for each, words in zip(found, every, strict=True):
+        if each.effect.place in {it.place for it in declared}:
             raise ConfigError(
                 f"--effect '{words}': the config declares it, so no diagnosis has to find it. Take "
                 "it out of `effects` of the config, or ask for another."
             )
-        if sum(words == it.in_words(case.robot.joint_names) for it in found) > 1:
+        if every.count(words) > 1:
             raise ConfigError(f"--effect '{words}' is given twice.")
     return found
-
-
-def _slug(case: Case, planted: PlantedEffect) -> str:
-    """A name of a file for it; the same kind on the same joint in two sizes has two."""
-    words = planted.in_words(case.robot.joint_names)
-    number = hashlib.sha256(words.encode()).hexdigest()[:8]
-    return f"{words.partition('=')[0].replace('@', '_').replace('/', '-')[:80]}_{number}"
-
-
-def _digest(task: _Task) -> str:
-    """Of all that cases share: the config, the motions and the settings."""
-    parts = [spec_as_yaml(task.case.spec), str(task.case.folder), repr(task.settings)]
-    parts += [f"{m.name} {m.trajectory.duration} {m.coefficients.tolist()}" for m in task.motions]
-    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
 def _predicted(
@@ -296,10 +223,9 @@ def _predicted(
         tell(Note(Level.NOTE, f"no power is predicted: {error}"))
         return [np.nan for _ in planted]
     assert problem.prediction is not None
-    alpha, names, found = case.spec.diagnosis.significance, case.robot.joint_names, []
+    alpha, found = case.spec.diagnosis.significance, []
     for one in planted:
-        kind, joints = one.effect.kind, tuple(names[j] for j in one.effect.joints)
-        size = abs(float(one.values[0]))
-        shown = power_of(problem.prediction, stack, alpha, kind, size)
-        found.append(next((each.power for each in shown if each.joints == joints), np.nan))
+        kind, joints = _name(one, case.robot.joint_names)
+        shown = power_of(problem.prediction, stack, alpha, kind, abs(float(one.values[0])))
+        found.append(next((it.power for it in shown if it.joints == joints), np.nan))
     return found

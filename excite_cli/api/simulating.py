@@ -24,7 +24,7 @@ from excite_cli.robot.model import Robot
 from excite_cli.shown.note import Level, Note, Tell, log_note, unheard
 from excite_cli.simulation.base_sensors import Instruments
 from excite_cli.simulation.covariate_series import parse_series as parse_series
-from excite_cli.simulation.ground_truth import PlantedEffect, parse_planted
+from excite_cli.simulation.ground_truth import parse_planted
 from excite_cli.simulation.leading import LeadingSetPoints
 from excite_cli.simulation.mujoco_model import load_mujoco
 from excite_cli.simulation.planned_motion import Planned, PlannedMotion, PlannedProgram
@@ -46,7 +46,7 @@ _FAR = 0.2  # rad (m): a joint this far from its set point does not follow it
 def simulate(
     problem: Problem | Case,
     motions: Motions,
-    effects: Sequence[str | PlantedEffect] = (),
+    effects: Sequence[str] = (),
     settings: SimulationSettings = SimulationSettings(),
     *,
     chosen: Sequence[int] = (),
@@ -59,11 +59,11 @@ def simulate(
 ) -> Simulation:
     """Play motions on a MuJoCo robot that differs from its model: `excite simulate`.
 
-    `effects` are put into the robot, records or `kind@joint=value[,name:value…]`; with `declared`
-    those of the config too, in sizes of their own. `chosen` are motions of a result by their index.
-    With `start` (position by joint [rad, m], the others at robot.posture; {}: all of them) the
-    robot enters each motion from rest there and goes back, within all constraints. Written to
-    `output` (HDF5) if that is given. `progress(run, done, total)` is called before every run.
+    `effects` are put into the robot, as `kind@joint=value[,name:value…]`; with `declared` those of
+    the config too, in sizes of their own. `chosen` are motions of a result by their index. With
+    `start` (position by joint [rad, m], the others at robot.posture; {}: all of them) the robot
+    enters each motion from rest there and goes back, within all constraints. Written to `output`
+    (HDF5) if that is given. `progress(run, done, total)` is called before every run.
 
     Returns
     -------
@@ -89,11 +89,7 @@ def simulate(
             raise FileError("There is no motion to play.")
         planned, settings = _planned(problem, segments, settings, start, tell)
         takes = takes_of(planned, settings.repeat)
-        planted = [
-            each
-            for given in effects
-            for each in (parse_planted(given, robot, takes) if isinstance(given, str) else (given,))
-        ]
+        planted = [each for text in effects for each in parse_planted(text, robot, takes)]
         own = declared_effects(problem.spec.effects, whole) if declared else ()
         if output is not None:
             _warn_of_reading(problem.spec.measurement, settings, tell)

@@ -1,22 +1,21 @@
 """Whether a diagnosis gives away what is planted: which effects, and what its answer is worth.
 
-With S the effects that an answer confirms, and p the planted one on its joints,
+With S the effects that an answer confirms, and p the planted one on its joints, it is
 
-    wrong       some of S is on other joints, and p is not among its aliases;
-    found       p is in S, or all effects that together are the same torque as p;
-    confounded  p is an alias of some of S; or S, or an approximation, names another effect on a
-                joint of p; or the answer lists p among those that inertias take up;
-    not found   none of these.
+    wrong       where some of S is on other joints, and p is not among its aliases;
+    found       where p is in S, or all effects that together are the same torque as p;
+    confounded  where p is an alias of some of S; where S, or an approximation, names another effect
+                on a joint of p; or where the answer lists p among those that inertias take up;
+    not found   else.
 
-The first that holds is the outcome. What was planted beside p, since p refines it, is neither asked
-for nor wrong. Effects that an answer names without confirming them do not count, right or wrong.
+The first that holds counts. What was planted beside p, since p refines it, is neither asked for nor
+wrong; nor is what an answer names without confirming it.
 """
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from math import nan
-from typing import Any
 
 import numpy as np
 
@@ -25,10 +24,10 @@ from excite_cli.effects.catalogue import catalogue, shows
 from excite_cli.robot.model import Robot
 from excite_cli.shown.answer import Shown
 from excite_cli.simulation.ground_truth import PlantedEffect, plant, sized
-from excite_cli.study.records import CaseRecord
 
 _RARE = 10.0  # `Effect.prior_cost` [χ²] of what one robot in a hundred has
 _BESIDE = 0  # seed of the sizes of what comes with an effect
+Name = tuple[str, tuple[str, ...]]  # kind, names of joints
 
 
 class Outcome(StrEnum):
@@ -38,18 +37,7 @@ class Outcome(StrEnum):
     CONFOUNDED = "confounded"
     NOT_FOUND = "not found"
     WRONG = "wrong"
-
-
-@dataclass(frozen=True)
-class Name:
-    """Kind and names of joints."""
-
-    kind: str
-    joints: tuple[str, ...]
-
-    def __str__(self) -> str:
-        """`spring@elbow`."""
-        return f"{self.kind}@{'+'.join(self.joints)}"
+    FAILED = "failed"
 
 
 @dataclass(frozen=True)
@@ -69,55 +57,52 @@ def judge(
     absorbed: Collection[Name] = (),
 ) -> tuple[Outcome, tuple[Name, ...]]:
     """The outcome (see the module), and the names that are wrong."""
-    sure = [each for each in said if each.sure and not each.near and each.name not in beside]
-    here = set(planted.joints)
-    wrong = tuple(
-        each.name
-        for each in sure
-        if not (_same(planted, each.name) or here & {*each.name.joints} or planted in each.aliases)
-    )
+    kind, joints = planted
+    sure = [each for each in said if each.sure and not each.near]
+    more = [each for each in sure if each.name not in beside]
+    there = [each for each in said if _same(planted, each.name) or {*joints} & {*each.name[1]}]
+    wrong = tuple(e.name for e in more if e not in there and planted not in e.aliases)
     if wrong:
         return Outcome.WRONG, wrong
-    parts = {Name(kind, planted.joints) for kind in catalogue()[planted.kind].same_as}
-    names = {each.name for each in said if each.sure and not each.near}
+    names = {each.name for each in sure}
+    parts = {(part, joints) for part in catalogue()[kind].same_as}
     if any(_same(planted, name) for name in names) or (parts and parts <= names):
         return Outcome.FOUND, ()
-    close = any(each.near and here & {*each.name.joints} for each in said)
-    told = sure or close or any(_same(planted, name) for name in absorbed)
-    return (Outcome.CONFOUNDED if told else Outcome.NOT_FOUND), ()
+    close = more or planted in absorbed or any(each.near for each in there)
+    return (Outcome.CONFOUNDED if close else Outcome.NOT_FOUND), ()
 
 
 def _same(planted: Name, name: Name) -> bool:
     """Whether it is that effect; of what the whole robot has, joints are no part of its name."""
-    whole = catalogue()[planted.kind].scope == "robot"
-    return planted.kind == name.kind and (whole or set(planted.joints) == set(name.joints))
+    whole = catalogue()[planted[0]].scope == "robot"
+    return planted[0] == name[0] and (whole or {*planted[1]} == {*name[1]})
 
 
 def usual_effects(robot: Robot, declared: Sequence[Effect], seed: int) -> list[PlantedEffect]:
-    """What many robots have on one joint, beside the `declared`, in sizes as those are simulated.
-
-    A size is 3 to 10 % of its joint's torque; that of a defect of the data a twentieth of its
-    largest usual one.
-    """
-    there = {effect.place for effect in declared}
-    found = []
+    """What many robots have on one joint, with 3 to 10 % of its torque, beside the `declared`."""
+    found: list[Effect] = []
     for kind in catalogue().values():
-        per_joint = kind.scope == "joint" and not (kind.carried or kind.per_run)
         dated = kind.of_campaign or kind.follows_covariate or bool(kind.changes_of)
-        if per_joint and not dated and kind.tier < Tier.LAST and kind.prior_cost < _RARE:
+        usual = kind.tier < Tier.LAST and kind.prior_cost < _RARE
+        if kind.scope == "joint" and usual and not (dated or kind.carried or kind.per_run):
             shape, _ = kind.planted(0.0, {})
             found += [kind(place, shape) for place in kind.places(robot)]
-    asked = [each for each in found if each.place not in there and shows(each, robot)]
-    return [replace(each, declared=False) for each in sized(robot, asked, seed)]
+    return _planted([each for each in found if shows(each, robot)], robot, declared, seed)
 
 
 def beside(planted: PlantedEffect, robot: Robot, declared: Sequence[Effect]) -> list[PlantedEffect]:
     """Effects of the same joints that it refines, as far as they are not `declared`."""
-    there = {effect.place for effect in declared}
     kinds = [catalogue()[name] for name in planted.effect.refines]
     found = [plant(kind, planted.effect.joints, 0.0).effect for kind in kinds]
-    asked = [each for each in found if each.place not in there]
-    return [replace(each, declared=False) for each in sized(robot, asked, _BESIDE)]
+    return _planted(found, robot, declared, _BESIDE)
+
+
+def _planted(
+    effects: Sequence[Effect], robot: Robot, declared: Sequence[Effect], seed: int
+) -> list[PlantedEffect]:
+    there = {effect.place for effect in declared}
+    new = [each for each in effects if each.place not in there]
+    return [replace(each, declared=False) for each in sized(robot, new, seed)]
 
 
 def spread(effects: Sequence[PlantedEffect], count: int, seed: int) -> list[PlantedEffect]:
@@ -127,17 +112,14 @@ def spread(effects: Sequence[PlantedEffect], count: int, seed: int) -> list[Plan
     while order and len(chosen) < count:
         kinds = [each.effect.kind for each in chosen]
         joints = [each.effect.joints for each in chosen]
-        best = min(
-            order, key=lambda it: kinds.count(it.effect.kind) + joints.count(it.effect.joints)
-        )
-        order = [each for each in order if each is not best]
-        chosen.append(best)
+        counts = [kinds.count(it.effect.kind) + joints.count(it.effect.joints) for it in order]
+        chosen.append(order.pop(counts.index(min(counts))))
     return chosen
 
 
 @dataclass(frozen=True)
 class SelftestCase:
-    """One planted effect and what a diagnosis makes of it; `outcome` is None where that failed.
+    """One planted effect and what a diagnosis makes of it, or the `message` that it failed with.
 
     `effect`: as `excite simulate --effect` takes it. `planted`: its size in `unit`; `found` ± `std`
     what the diagnosis says, NaN where it is not named. `power`: the probability with which motions
@@ -149,61 +131,34 @@ class SelftestCase:
     effect: str
     kind: str
     joints: tuple[str, ...]
-    outcome: Outcome | None
     planted: float
-    unit: str
+    power: float = nan
+    outcome: str = Outcome.FAILED
+    unit: str = ""
     found: float = nan
     std: float = nan
-    power: float = nan
     before: float = nan
     after: float = nan
-    named: tuple[str, ...] = ()
-    wrong: tuple[str, ...] = ()
+    named: str = ""
+    wrong: str = ""
     message: str = ""
     seconds: float = 0.0
 
 
 @dataclass(frozen=True, repr=False)
 class Selftest(Shown):
-    """What a diagnosis makes of each planted effect: `cases` that were done, of `asked`.
-
-    `joint_names` (n,) of the `robot`.
-    """
+    """What a diagnosis makes of each planted effect: `cases` that were done, of `asked`."""
 
     robot: str
     joint_names: tuple[str, ...]
     cases: tuple[SelftestCase, ...]
     asked: int
 
-    def count(self, outcome: Outcome | None) -> int:
-        """How many cases ended so; None: failed."""
-        return sum(case.outcome is outcome for case in self.cases)
+    def count(self, outcome: str) -> int:
+        """How many cases ended so."""
+        return sum(case.outcome == outcome for case in self.cases)
 
     @property
     def good(self) -> bool:
         """Whether no case is wrong, and none failed."""
-        return not self.count(Outcome.WRONG) and not self.count(None)
-
-
-def case_of(record: CaseRecord, planted: PlantedEffect, joints: Sequence[str]) -> SelftestCase:
-    """A case as its record has it; names `joints` (n,) of the robot."""
-    figures, number = record.figures, planted.number
-    value = planted.effect.parameters
-    unit = next((p.unit for p in (*value, *planted.effect.shapes) if p.name == number), "")
-    known: dict[str, Any] = {
-        key: float(figures[key])
-        for key in ("found", "std", "power", "before", "after")
-        if figures.get(key) is not None
-    }
-    known |= {key: tuple(figures.get(key, "").split()) for key in ("named", "wrong")}
-    return SelftestCase(
-        record.values["effect"],
-        planted.effect.kind,
-        tuple(joints[j] for j in planted.effect.joints),
-        Outcome(figures["outcome"]) if figures else None,
-        planted.named()[number],
-        figures.get("unit", unit),
-        **known,
-        message=record.message,
-        seconds=record.seconds,
-    )
+        return not (self.count(Outcome.WRONG) or self.count(Outcome.FAILED))

@@ -8,24 +8,23 @@ from excite_cli.config.load_spec import load_spec
 from excite_cli.effects.catalogue import catalogue
 from excite_cli.robot.model import Robot, build_robot
 from excite_cli.simulation.ground_truth import parse_planted
-from excite_cli.study.records import CaseRecord
 from excite_cli.study.selftest import (
     Name,
     Outcome,
     Said,
     Selftest,
+    SelftestCase,
     beside,
-    case_of,
     judge,
     spread,
     usual_effects,
 )
 
 SMOKE = Path(__file__).resolve().parents[2] / "configs" / "smoke.yaml"
-GEARS = Name("gear_loss", ("elbow",))
-DRY = Name("coulomb_friction", ("elbow",))
-ELSEWHERE = Name("spring", ("slide",))
-PARTS = [Said(Name(kind, ("elbow",))) for kind in ("load_dependent_friction", "torque_gain")]
+GEARS: Name = ("gear_loss", ("elbow",))
+DRY: Name = ("coulomb_friction", ("elbow",))
+ELSEWHERE: Name = ("spring", ("slide",))
+PARTS = [Said((kind, ("elbow",))) for kind in ("load_dependent_friction", "torque_gain")]
 
 
 @pytest.fixture(scope="module")
@@ -46,8 +45,8 @@ def robot() -> Robot:
         ([Said(GEARS), Said(ELSEWHERE, sure=False)], Outcome.FOUND),
         ([Said(GEARS), Said(ELSEWHERE, near=True)], Outcome.FOUND),
         ([Said(ELSEWHERE, (GEARS,))], Outcome.CONFOUNDED),
-        ([Said(Name("spring", ("elbow",)))], Outcome.CONFOUNDED),
-        ([Said(Name("coupled_friction", ("elbow", "slide")))], Outcome.CONFOUNDED),
+        ([Said(("spring", ("elbow",)))], Outcome.CONFOUNDED),
+        ([Said(("coupled_friction", ("elbow", "slide")))], Outcome.CONFOUNDED),
         (PARTS, Outcome.FOUND),  # together the same torque
         (PARTS[:1], Outcome.CONFOUNDED),
     ],
@@ -64,9 +63,9 @@ def test_what_inertias_take_up_is_confounded() -> None:
 
 
 def test_of_what_the_whole_robot_has_joints_are_no_part_of_the_name() -> None:
-    load = Name("payload", ("slide",))
-    assert judge(load, [Said(Name("payload", ("elbow",)))])[0] is Outcome.FOUND
-    assert judge(Name("spring", ("slide",)), [Said(Name("spring", ("elbow",)))])[1]
+    load = ("payload", ("slide",))
+    assert judge(load, [Said(("payload", ("elbow",)))])[0] is Outcome.FOUND
+    assert judge(("spring", ("slide",)), [Said(("spring", ("elbow",)))])[1]
 
 
 def test_usual_effects_are_those_of_many_robots(robot: Robot) -> None:
@@ -106,9 +105,6 @@ def test_what_an_effect_refines_comes_with_it(robot: Robot) -> None:
     assert beside(planted, robot, [each.effect for each in more]) == []
 
 
-def test_a_case_that_failed_is_bad(robot: Robot) -> None:
-    (planted,) = parse_planted("armature@elbow=1", robot, {})
-    record = CaseRecord("a", {"effect": "armature@elbow=1"}, None, "", {}, "no way", (), 0.0)
-    case = case_of(record, planted, robot.joint_names)
-    assert (case.outcome, case.message, case.unit) == (None, "no way", "kg·m²")
-    assert not Selftest("arm", robot.joint_names, (case,), 1).good
+def test_a_case_that_failed_is_bad() -> None:
+    case = SelftestCase("armature@elbow=1", "armature", ("elbow",), 1.0, message="no way")
+    assert not Selftest("arm", ("elbow",), (case,), 1).good
