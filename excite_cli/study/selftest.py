@@ -122,10 +122,8 @@ class SelftestCase:
     """One planted effect and what a diagnosis makes of it, or the `message` that it failed with.
 
     `effect`: as `excite simulate --effect` takes it. `planted`: its size in `unit`; `found` ± `std`
-    what the diagnosis says, NaN where it is not named. `power`: the probability with which motions
-    like these were predicted to name it, NaN where nothing is predicted. `before` and `after`: mean
-    error of the held-out torque, as a share. `named`: effects of the answer that are confirmed;
-    `wrong`: those that are not there.
+    in the answer. `power`: predicted probability to name it. `before`, `after`: mean error of the
+    held-out torque, as a share. NaN: not known. `named`: what the answer confirms; `wrong` of it.
     """
 
     effect: str

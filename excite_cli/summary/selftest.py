@@ -13,9 +13,8 @@ _LEGEND = (
     "confirmed), ! failed"
 )
 _POWER = (
-    "power: probability with which the motions were predicted to show this size (noise as for "
-    "planning: 2% of the usual torque in 20 independent samples a second); before, after: held-out "
-    "error; confirmed: other effects of the answer."
+    "power: predicted probability to name this size, with the noise that planning assumes; before, "
+    "after: held-out error; confirmed: other effects of the answer."
 )
 
 

@@ -1,5 +1,6 @@
 """A self-test from Python and at the command line: outcomes, messages, what is kept."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -72,16 +73,12 @@ def test_measured_motions_are_replayed_at_their_rate(result: Result) -> None:
         ("spring@elbow", [], "not of the form"),
         ("spring@elbow=1", ["effects=[{kind: spring, joints: [elbow]}]"], "config declares it"),
         (EASY, ["measurement.covariates=[temp]"], "no further columns"),
+        (f"{EASY}|{EASY}", [], "given twice"),
     ],
 )
 def test_messages(result: Result, effect: str, overrides: list[str], words: str) -> None:
     with pytest.raises(ConfigError, match=words):
-        selftest(load_case(SMOKE, overrides), result, [effect])
-
-
-def test_effects_given_twice(result: Result) -> None:
-    with pytest.raises(ConfigError, match="given twice"):
-        selftest(load_case(SMOKE), result, [EASY, EASY])
+        selftest(load_case(SMOKE, overrides), result, effect.split("|"))
 
 
 def test_motions_of_another_robot(result: Result) -> None:
@@ -90,8 +87,6 @@ def test_motions_of_another_robot(result: Result) -> None:
 
 
 def test_a_robot_without_masses(result: Result, tmp_path: Path) -> None:
-    import re
-
     urdf = (SMOKE.parents[1] / "data" / "smoke_arm.urdf").read_text()
     (tmp_path / "arm.urdf").write_text(re.sub(r"<inertial>.*?</inertial>", "", urdf, flags=re.S))
     with pytest.raises(RobotError, match="no masses"):

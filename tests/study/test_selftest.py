@@ -57,13 +57,10 @@ def test_judging(said: list[Said], outcome: Outcome) -> None:
     assert wrong == ((ELSEWHERE,) if outcome is Outcome.WRONG else ())
 
 
-def test_what_inertias_take_up_is_confounded() -> None:
+def test_what_inertias_take_up_and_what_the_whole_robot_has() -> None:
     assert judge(GEARS, [], (), [GEARS])[0] is Outcome.CONFOUNDED
     assert judge(GEARS, [], (), [ELSEWHERE])[0] is Outcome.NOT_FOUND
-
-
-def test_of_what_the_whole_robot_has_joints_are_no_part_of_the_name() -> None:
-    load = ("payload", ("slide",))
+    load = ("payload", ("slide",))  # joints are no part of its name
     assert judge(load, [Said(("payload", ("elbow",)))])[0] is Outcome.FOUND
     assert judge(("spring", ("slide",)), [Said(("spring", ("elbow",)))])[1]
 
