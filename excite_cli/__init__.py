@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from excite_cli.api.reporting import write_report as write_report
     from excite_cli.api.scoring import score as score
     from excite_cli.api.scoring import thresholds as thresholds
+    from excite_cli.api.selftesting import selftest as selftest
     from excite_cli.api.simulating import simulate as simulate
     from excite_cli.api.studying import run_study as run_study
     from excite_cli.api.verifying import verify_gradient as verify_gradient
@@ -99,6 +100,8 @@ if TYPE_CHECKING:
     from excite_cli.simulation.settings import SimulationSettings as SimulationSettings
     from excite_cli.simulation.simulate import Simulation as Simulation
     from excite_cli.study.records import CaseRecord as CaseRecord
+    from excite_cli.study.selftest import Selftest as Selftest
+    from excite_cli.study.selftest import SelftestCase as SelftestCase
     from excite_cli.trajectory.fade import Segment as Segment
     from excite_cli.workers.base import Workers as Workers
     from excite_cli.workers.context import open_workers as open_workers
@@ -132,6 +135,7 @@ _HOMES = {
     "api.replaying": ("replay",),
     "api.reporting": ("Report", "write_report"),
     "api.scoring": ("score", "thresholds"),
+    "api.selftesting": ("selftest",),
     "api.simulating": ("simulate",),
     "api.studying": ("run_study",),
     "api.verifying": ("verify_gradient",),
@@ -147,6 +151,7 @@ _HOMES = {
     "robot.overview": ("DescribedRobot",),
     "shown.answer": ("Answer",),
     "study.records": ("CaseRecord",),
+    "study.selftest": ("Selftest", "SelftestCase"),
     "errors": (
         "ConfigError",
         "ExciteError",

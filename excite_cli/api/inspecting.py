@@ -162,14 +162,19 @@ def power_of_data(case: Case, data: Dataset) -> tuple[EffectPower, ...]:
     FileError
         A run is too short, or nothing in the data can be used.
     """
-    spec, kept = case.spec, data.runs[: max(1, len(data.runs) - 1)]
+    problem, kept = bare_problem(case), data.runs[: max(1, len(data.runs) - 1)]
+    assert problem.prediction is not None
+    stack, _ = measured_stack(problem, replace(data, runs=kept))
+    return sizes_shown(problem.prediction, stack, case.spec.diagnosis.significance)
+
+
+def bare_problem(case: Case) -> Problem:
+    """What is unknown of a robot, for motions that are there: no constraint asks for more."""
+    spec = case.spec
     criterion = spec.criterion.model_copy(update={"kind": "predicted_torque"})
     bare = ConstraintsSpec(joint_limits=spec.constraints.joint_limits)  # no motion is sought
     update = {"criterion": criterion, "constraints": bare, "task": TaskSpec()}
-    problem = build_problem(spec.model_copy(update=update), case.folder)
-    assert problem.prediction is not None
-    stack, _ = measured_stack(problem, replace(data, runs=kept))
-    return sizes_shown(problem.prediction, stack, spec.diagnosis.significance)
+    return build_problem(spec.model_copy(update=update), case.folder)
 
 
 def _in_vain(settings: Mapping[str, Any], error: ExciteError) -> CheckResult:

@@ -25,6 +25,7 @@ from excite_cli.cli.report import report
 from excite_cli.cli.robots import robots
 from excite_cli.cli.schema import schema
 from excite_cli.cli.score import score
+from excite_cli.cli.selftest import selftest
 from excite_cli.cli.simulate import simulate
 from excite_cli.cli.stopping import heed_signals
 from excite_cli.cli.streams import steady_streams
@@ -66,6 +67,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "inspect": inspect,
     "identify": identify,
     "simulate": simulate,
+    "selftest": selftest,
     "diagnose": diagnose,
     "score": score,
     "compare": compare,
@@ -93,7 +95,7 @@ _GROUPS = {
         "replay",
     ),
     "The whole loop": ("campaign",),
-    "Many cases": ("study",),
+    "Many cases": ("study", "selftest"),
 }
 _ORDER = [name for names in _GROUPS.values() for name in names]
 _ORDER += [name for name in _COMMANDS if name not in _ORDER]

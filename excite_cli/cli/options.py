@@ -3,6 +3,7 @@
 import functools
 import inspect
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,7 +14,25 @@ from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import MESSAGES, OUTPUT, WORK
 from excite_cli.errors import ConfigError
 
-# The posture of --from.
+# The recording of a simulated robot, and the posture of --from.
+
+_recorded = partial(typer.Option, rich_help_panel="Recording")
+TorqueNoise = Annotated[
+    float, _recorded("--torque-noise", help="Torque noise as a share of the joint's RMS torque.")
+]
+NoiseCorrelation = Annotated[
+    float,
+    _recorded("--noise-correlation", help="Correlation of the noise from sample to sample."),
+]
+Encoder = Annotated[float, _recorded("--encoder", help="Resolution of the encoders, in rad (m).")]
+InertiaError = Annotated[
+    float,
+    typer.Option(
+        "--inertia-error",
+        help="Deviation of the robot's inertias from the URDF; 0: none.",
+        rich_help_panel="Simulated robot",
+    ),
+]
 
 
 def start_from(text: str | None, entry: bool) -> dict[str, float] | None:

@@ -78,13 +78,9 @@ def simulate(
         help="The posture of --entry [rad, m]; joints not named are at robot.posture.",
     ),
     rate: float = _recorded(500.0, "--rate", help="Samples per second [Hz]."),
-    torque_noise: float = _recorded(
-        0.01, "--torque-noise", help="Torque noise as a share of the joint's RMS torque."
-    ),
-    noise_correlation: float = _recorded(
-        0.0, "--noise-correlation", help="Correlation of the noise from sample to sample."
-    ),
-    encoder: float = _recorded(2e-05, "--encoder", help="Resolution of the encoders, in rad (m)."),
+    torque_noise: options.TorqueNoise = 0.01,
+    noise_correlation: options.NoiseCorrelation = 0.0,
+    encoder: options.Encoder = 2e-05,
     wrench_noise: str | None = _recorded(
         None,
         "--wrench-noise",
@@ -98,9 +94,7 @@ def simulate(
         help="Noise of the base's inertial unit [m/s², rad/s], where the config declares "
         "one. Default: 0.02,0.001.",
     ),
-    inertia_error: float = _of_robot(
-        0.2, "--inertia-error", help="Deviation of the robot's inertias from the URDF; 0: none."
-    ),
+    inertia_error: options.InertiaError = 0.2,
     no_declared: bool = _of_robot(
         False, "--no-declared", help="Leave out the effects that the config declares."
     ),

@@ -13,6 +13,7 @@ from excite_cli.excitation.objective import Objective, Stack
 from excite_cli.excitation.problem import Problem, predicting
 from excite_cli.excitation.result import Result
 from excite_cli.robot.model import Array
+from excite_cli.trajectory.base import Trajectory
 
 _FINER = 10  # instants in the time of a sample
 
@@ -73,17 +74,23 @@ def expectation(
     )
 
 
-def rows_as_recorded(problem: Problem, objective: Objective, coefficients: Array) -> Array:
+def rows_as_recorded(
+    problem: Problem,
+    objective: Objective,
+    coefficients: Array,
+    trajectory: Trajectory | None = None,
+) -> Array:
     """Rows (N·R, c) of a motion as its recording has them, in units of the noise.
 
     `task.rate` independent samples a second are means over as long: of a column that lasts for less
-    (Stribeck friction at a reversal) they show less.
+    (Stribeck friction at a reversal) they show less. `trajectory`: of a motion that has another
+    than the problem's.
     """
-    rate, duration = problem.spec.task.rate, problem.trajectory.duration
-    count = max(1, int(rate * duration))
+    trajectory, rate = trajectory or problem.trajectory, problem.spec.task.rate
+    count = max(1, int(rate * trajectory.duration))
     times: Array = np.arange(count * _FINER) / (rate * _FINER)
-    states = problem.trajectory.states(times, coefficients)
+    states = trajectory.states(times, coefficients)
     block = objective.block_of(times, *states)
     means = block.reshape(count, _FINER, -1, block.shape[1]).mean(axis=1)
-    weight = np.sqrt(rate * duration / len(problem.cost_basis.times))
+    weight = np.sqrt(rate * problem.trajectory.duration / len(problem.cost_basis.times))
     return np.asarray(means.reshape(-1, block.shape[1]) / weight)

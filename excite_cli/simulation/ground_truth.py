@@ -42,6 +42,18 @@ class PlantedEffect:
         }
         return {**self.effect.settings, **self.extra, **self.effect.shape, **linear}
 
+    @property
+    def number(self) -> str:
+        """The name of the number that its kind is known by."""
+        return self.effect.known_by or self.effect.parameters[0].name
+
+    def in_words(self, joint_names: Sequence[str]) -> str:
+        """As `parse_planted` takes it."""
+        numbers, joints = self.named(), ",".join(joint_names[j] for j in self.effect.joints)
+        names = [name for name in allowed_names(type(self.effect)) if name in numbers]
+        others = "".join(f",{name}:{numbers[name]:.6g}" for name in names)
+        return f"{self.effect.kind}@{joints}={numbers[self.number]:.6g}{others}"
+
     def record(self, joint_names: Sequence[str], sliding: NDArray[np.bool_]) -> dict[str, Any]:
         """As plain data, for files and answers; names (n,) of the robot's joints, which slide."""
         nothing = np.zeros((len(self.values), len(self.values)))

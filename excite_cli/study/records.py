@@ -5,19 +5,22 @@ A record is written last, so where there is one the case is complete.
 
 import csv
 import io
+import itertools
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from excite_cli.atomic import write_atomically
 from excite_cli.claim import claim
 from excite_cli.errors import ExciteError, FileError, refusal
-from excite_cli.study.case import SUFFIXES, DoneCase, StudyCase, StudyTask, as_data
+from excite_cli.shown.note import never
+from excite_cli.study.case import SUFFIXES, DoneCase, StudyCase, as_data
 from excite_cli.workers.base import Here, News, Tell, Workers
 
 TABLE = "study.csv"
+T = TypeVar("T")  # what all cases share
 _SCHEMA = 1
 
 
@@ -172,18 +175,19 @@ class StudyNews:
 
 
 def run_study(
-    task: StudyTask,
+    task: T,
     cases: Sequence[StudyCase],
     folder: Path,
-    do_case: Callable[[StudyTask, StudyCase, Tell], DoneCase],
+    do_case: Callable[[T, StudyCase, Tell], DoneCase],
     workers: Workers | None = None,
     resume: bool = False,
     report: Callable[[StudyNews], None] = lambda news: None,
     overwrite: bool = False,
+    ended: Callable[[], bool] = never,
 ) -> list[CaseRecord]:
     """Do all cases, in `folder` a record and the files of each; a failure is a record too.
 
-    `do_case` does one; workers import it by its name.
+    `do_case` does one; workers import it by its name. Once `ended` says so, no other is begun.
 
     With `resume` cases that are there already are not done again, failed ones are; with `overwrite`
     all are. The table of all is written at the end; the folder is claimed by its name. Results do
@@ -219,8 +223,9 @@ def run_study(
         report(StudyNews(before + news.done, news.running, len(cases), best, told))
 
     place = workers or Here()
-    place.map(do_case, task, [cases[index] for index in left], watch, keep_failures=True)
-    found = [records[index] for index in range(len(cases))]
+    begun = (cases[index] for index in itertools.takewhile(lambda index: not ended(), left))
+    place.map(do_case, task, begun, watch, keep_failures=True)
+    found = [records[index] for index in sorted(records)]
     write_table(folder, found)
     return found
 

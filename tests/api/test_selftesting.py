@@ -1,0 +1,102 @@
+"""A self-test from Python and at the command line: outcomes, messages, what is kept."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from excite_cli import (
+    ConfigError,
+    FileError,
+    MissingExtraError,
+    Result,
+    RobotError,
+    load_case,
+    load_problem,
+    plan,
+    selftest,
+    simulate,
+)
+from excite_cli.api import selftesting
+from excite_cli.api.selftesting import selftest_answer, usual_settings
+from excite_cli.simulation.settings import SimulationSettings
+from excite_cli.study.selftest import Outcome
+
+SMOKE = Path(__file__).resolve().parents[2] / "configs" / "smoke.yaml"
+EASY, FAINT = "armature@elbow=0.15", "torque_gain@wrist_roll=0.0001"
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    return plan(load_problem(SMOKE, ["optimizer.max_iterations=20", "constraints={}"]))
+
+
+def test_what_is_found_and_what_is_not(result: Result) -> None:
+    case = load_case(SMOKE)
+    told: list[int] = []
+    found = selftest(case, result, [EASY, FAINT], progress=lambda news: told.append(news.done))
+    easy, faint = found.cases
+    assert easy.outcome == Outcome.FOUND
+    assert easy.found == pytest.approx(0.15, abs=4 * easy.std)
+    assert easy.after < easy.before
+    assert easy.power > 0.9
+    assert faint.outcome == Outcome.NOT_FOUND
+    assert faint.power < 0.1
+    assert np.isnan(faint.found)
+    assert found.good
+    assert told[-1] == 2
+    answer = selftest_answer(found)
+    assert answer.parts[0].startswith("1 of 2 planted effects would be found (1 not found)")  # type: ignore[union-attr]
+    assert [each["outcome"] for each in answer.data["cases"]] == ["found", "not found"]
+
+
+def test_stopping_keeps_what_is_done(result: Result) -> None:
+    asked = iter([False, True])
+    found = selftest(load_case(SMOKE), result, [EASY, FAINT], ended=lambda: next(asked))
+    assert [each.effect for each in found.cases] == [EASY]
+    assert "1 not tried" in str(selftest_answer(found).parts[0])
+
+
+def test_measured_motions_are_replayed_at_their_rate(result: Result) -> None:
+    case = load_case(SMOKE)
+    log = simulate(case, result, (), SimulationSettings(rate=200.0)).dataset
+    assert usual_settings(case, log).rate == pytest.approx(200.0)
+    assert usual_settings(case, result).rate == SimulationSettings().rate
+
+
+@pytest.mark.parametrize(
+    ("effect", "overrides", "words"),
+    [
+        ("sprong@elbow=1", [], "sprong.*Did you mean 'spring'"),
+        ("spring@elbo=1", [], "no moved joint 'elbo'"),
+        ("spring@elbow", [], "not of the form"),
+        ("spring@elbow=1", ["effects=[{kind: spring, joints: [elbow]}]"], "config declares it"),
+        (EASY, ["measurement.covariates=[temp]"], "no further columns"),
+        (f"{EASY}|{EASY}", [], "given twice"),
+    ],
+)
+def test_messages(result: Result, effect: str, overrides: list[str], words: str) -> None:
+    with pytest.raises(ConfigError, match=words):
+        selftest(load_case(SMOKE, overrides), result, effect.split("|"))
+
+
+def test_motions_of_another_robot(result: Result) -> None:
+    with pytest.raises(FileError, match="moves other joints"):
+        selftest(load_case(SMOKE, ["robot.joints=[elbow, slide]"]), result)
+
+
+def test_a_robot_without_masses(result: Result, tmp_path: Path) -> None:
+    urdf = (SMOKE.parents[1] / "data" / "smoke_arm.urdf").read_text()
+    (tmp_path / "arm.urdf").write_text(re.sub(r"<inertial>.*?</inertial>", "", urdf, flags=re.S))
+    with pytest.raises(RobotError, match="no masses"):
+        selftest(load_case(SMOKE, [f"robot.urdf={tmp_path / 'arm.urdf'}"]), result, [EASY])
+
+
+def test_without_mujoco(result: Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing() -> None:
+        raise MissingExtraError("pip install 'excite-cli[sim]'")
+
+    monkeypatch.setattr(selftesting, "load_mujoco", missing)
+    with pytest.raises(MissingExtraError, match="sim"):
+        selftest(load_case(SMOKE), result)
