@@ -15,12 +15,13 @@ from excite_cli.api.loading import (
     sources_of,
     tell_findings,
 )
-from excite_cli.api.model_exports import write_models
+from excite_cli.api.model_exports import write_exported, write_models
 from excite_cli.api.outputs import held
 from excite_cli.checks.all_checks import check_dataset
 from excite_cli.config.load_spec import spec_as_yaml
 from excite_cli.excitation.problem import Problem
 from excite_cli.export.drive import drive_of
+from excite_cli.export.payload_formats import flange_of, payload_text
 from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.identification.carried_load import LoadIdentification
 from excite_cli.identification.carried_load import identify_load as load_on
@@ -104,12 +105,16 @@ def identify_load(
     fit: StoredFit | str | Path,
     link: str | None = None,
     *,
+    ur: str | Path | None = None,
+    franka: str | Path | None = None,
+    overwrite: bool = False,
     tell: Tell = log_note,
 ) -> LoadIdentification:
     """What the robot carries, on top of a fit without it: `excite identify --only payload`.
 
     `fit` is the fit of the robot alone (`read_fit`), or its file; `link` carries the load, by
-    default the last one.
+    default the last one. For the robot's controller it is written to `ur` (URScript) or `franka`
+    (endeffector-config.json); then the default is the tool flange.
 
     Returns
     -------
@@ -120,15 +125,24 @@ def identify_load(
     Raises
     ------
     ConfigError, FileError
-        The link is unknown or must be named; the fit belongs to another robot; a run is too short.
+        The link is unknown or must be named; the fit belongs to another robot; a run is too short;
+        a file exists already; no payload was found that a controller could be told.
     """
     problem = measured_case(problem)
-    problem, dataset = with_drive_law(problem, dataset_of(problem, data, tell), None, tell)
-    # Signs and order of columns are not judged: beside the URDF, a load looks like other columns.
-    stored = fit if isinstance(fit, StoredFit) else read_fit(Path(fit))
-    found = load_on(problem.robot, robot_base(problem), dataset, problem.spec, stored, link)
-    tell_findings(found.findings[len(dataset.findings) :], tell)
-    return found
+    files = {kind: path for kind, path in (("ur", ur), ("franka", franka)) if path is not None}
+    of_fit = [] if isinstance(fit, StoredFit) else [fit]
+    with held(files, overwrite, inputs_of(problem, *sources_of(data), *of_fit)):
+        for kind in files:
+            link = link or flange_of(problem.robot, kind)
+        problem, dataset = with_drive_law(problem, dataset_of(problem, data, tell), None, tell)
+        # Signs and order of columns are not judged: beside the URDF, a load looks like others.
+        stored = fit if isinstance(fit, StoredFit) else read_fit(Path(fit))
+        found = load_on(problem.robot, robot_base(problem), dataset, problem.spec, stored, link)
+        tell_findings(found.findings[len(dataset.findings) :], tell)
+        texts = {Path(path): payload_text(found, kind) for kind, path in files.items()}
+        for path, text in texts.items():
+            write_exported(text, path, tell)
+        return found
 
 
 @checked()

@@ -13,6 +13,7 @@ from excite_cli.checks.all_checks import look
 from excite_cli.errors import ExciteError, FileError
 from excite_cli.identification.split import split, whole
 from excite_cli.identification.torque_trace import torque_units
+from excite_cli.measurement.arrange import OtherJointsError
 from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.scoring.records import Score, ScoredRun
 from excite_cli.scoring.score import Scorer, Shift, shift_of, together, with_shift
@@ -123,7 +124,14 @@ def score_file(
     model, held_out, single, worse = shared
     given = _known_model(model, Path(model).stat().st_mtime_ns)
     case = Case(given.made.spec, given.made.folder, given.made.robot)
-    return _scored(given, load_data(case, path, unheard), path, held_out, single, worse)
+    try:
+        data = load_data(case, path, unheard)
+    except OtherJointsError as error:
+        raise FileError(
+            f"{error} If these names are right, the data are of another robot than "
+            f"{given.made.robot.name}, which {model} is of: score them with a model of that one."
+        ) from error
+    return _scored(given, data, path, held_out, single, worse)
 
 
 @lru_cache(maxsize=1)

@@ -120,7 +120,7 @@ def sections_of(command: Any, ctx: Any) -> dict[str, list[tuple[str, str]]]:
 
 def _argument(param: Any) -> str:
     name = str(param.metavar or param.name).upper()
-    name += "…" * (param.nargs != 1)
+    name = name.rstrip("…") + "…" * (param.nargs != 1)
     return name if param.required else f"[{name}]"
 
 

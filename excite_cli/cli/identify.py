@@ -32,6 +32,12 @@ def identify(
         None, "--fit", help="Fit of the robot alone, for --only payload."
     ),
     link: options.Link = None,
+    ur: Path | None = options.written(
+        "--ur", metavar="FILE.script", help="Write the payload as URScript (Universal Robots)."
+    ),
+    franka: Path | None = options.written(
+        "--franka", metavar="FILE.json", help="Write the payload for Franka's Desk (JSON)."
+    ),
     workers: options.Workers = 1,
     scheduler: options.Scheduler = None,
     overwrite: options.Overwrite = False,
@@ -44,8 +50,9 @@ def identify(
     held out. --workers split the runs; the results are identical.
 
     With --only payload, mass, centre and inertia of what the robot carries are found from all runs,
-    on top of the fit of the bare robot and its uncertainty. Exit status 1: they are physically
-    infeasible.
+    on top of the fit of the bare robot and its uncertainty. --ur or --franka writes them for the
+    robot's controller, in the frame of the tool flange (link tool0, link8; another with --link).
+    Exit status 1: they are physically infeasible.
 
     Examples:
       excite identify ur10.yaml measured.h5 -o fit.h5
@@ -58,6 +65,7 @@ def identify(
     from excite_cli.api.working import working
     from excite_cli.errors import ConfigError
 
+    formats = {"ur": ur, "franka": franka}
     models = {"urdf": urdf, "mjcf": mjcf, "parameters": parameters}
     if only is not None:
         given = {"-o": output, "--held-out": held_out}
@@ -69,11 +77,14 @@ def identify(
             raise ConfigError("--only payload needs --fit: a fit of the robot without it.")
         with terminal.live("identify"):
             case = load_case(config, overrides or ())
-            load = identify_load(case, data, fit, link, tell=terminal.tell)
-        terminal.show(load_answer(load))
+            load = identify_load(
+                case, data, fit, link, **formats, overwrite=overwrite, tell=terminal.tell
+            )
+        terminal.show(load_answer(load, formats))
         return
-    if fit is not None or link is not None:
-        raise ConfigError("--fit and --link belong to --only payload.")
+    given = {"--fit": fit, "--link": link, "--ur": ur, "--franka": franka}
+    if any(each is not None for each in given.values()):
+        raise ConfigError("--fit, --link, --ur and --franka belong to --only payload.")
     with (
         working(workers, scheduler, 1, terminal.tell) as place,
         terminal.live("identify") as line,

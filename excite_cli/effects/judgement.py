@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cache
+from math import inf
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -84,12 +85,13 @@ class Tier(IntEnum):
 class Seen:
     """Of each moved joint (n,) [N·m]: the largest measured `torque`, and RMS of the rigid `load`.
 
-    `mass` of the robot [kg].
+    `mass` of the robot [kg]; `reach` [m], beyond which it carries nothing (default: no bound).
     """
 
     torque: Array
     load: Array
     mass: float
+    reach: float = inf
 
 
 class Judgement:

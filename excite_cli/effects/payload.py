@@ -106,12 +106,18 @@ class Payload(Effect):
         return f"no body has this mass ({values[0]:.3g} kg), centre and inertia, or nearly so"
 
     def absurd(self, values: Array, seen: Seen) -> str:
-        """Nobody lets a robot carry more than it weighs, or notices what weighs next to nothing."""
+        """Nobody lets a robot carry more than it weighs, or notices what weighs next to nothing.
+
+        Nor does it carry anything whose centre is farther off than `seen.reach`.
+        """
         mass = float(values[0])
         if mass > seen.mass:
             return f"mass of {mass:.3g} kg is more than the robot's own {seen.mass:.3g} kg"
         if mass < _NOTHING * seen.mass:
             return f"mass of {mass:.2g} kg is next to nothing beside {seen.mass:.3g} kg of robot"
+        far = float(np.linalg.norm(values[1:4])) / mass
+        if far > seen.reach:
+            return f"its centre is {far:.2g} m off its link, more than {seen.reach:.2g} m"
         return ""
 
     def nearest(self, values: Array, covariance: Array) -> Array:

@@ -11,6 +11,11 @@ from excite_cli.errors import ConfigError, FileError, nearest
 from excite_cli.measurement.dataset import Array, Finding, Run
 from excite_cli.measurement.reader import CHANNELS, RawRun
 
+
+class OtherJointsError(FileError):
+    """A file has positions of joints, and of none that the robot moves."""
+
+
 _LISTED, _LONGEST = 40, 60  # names that are reported; characters of each
 _CHANNEL_WORDS = {
     "q": "position", "tau": "torque", "dq": "speed", "q_cmd": "position set point",
@@ -71,7 +76,9 @@ def arrange(
         if not missing:
             matrices[channel] = np.column_stack([by_joint[joint] for joint in joints])
         elif channel in ("q", *beside):
-            raise FileError(_missing(source, raw.name, channel, missing, list(columns)))
+            other = channel == "q" and bool(columns) and len(missing) == len(joints)
+            kind = OtherJointsError if other else FileError
+            raise kind(_missing(source, raw.name, channel, missing, list(columns)))
         elif channel == "dq":
             text = f"speed of {', '.join(missing)} is missing; recorded speeds are not used"
             findings.append(Finding("no_speed", "note", text, raw.name, tuple(missing)))

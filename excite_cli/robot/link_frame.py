@@ -137,6 +137,11 @@ def branches(robot: Robot) -> list[tuple[int, ...]]:
     return [tuple(j for j in range(robot.n) if carried[j] == {leaf}) for leaf in leaves(robot)]
 
 
+def links_ending(robot: Robot, end: str) -> list[str]:
+    """Names of links that end so, whatever prefix a robot of several arms gives them."""
+    return [name for name in _links(robot) if name.endswith(end)]
+
+
 def _links(robot: Robot) -> dict[str, pin.Frame]:
     return {str(f.name): f for f in robot.model.frames if f.type == pin.FrameType.BODY}
 

@@ -20,6 +20,7 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.dynamics.regressor import PARAMETER_NAMES, standard_parameter_unit
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.identification.fit import Fit
@@ -90,6 +91,11 @@ class Change(Shown):
         """Whether chance does not explain it."""
         return self.p_value < SIGNIFICANT
 
+    @property
+    def steps(self) -> float:
+        """Its size in standard deviations, which orders those whose p is too small a number."""
+        return (self.after - self.before) / self.std if self.std > 0.0 else 0.0
+
 
 @dataclass(frozen=True, repr=False)
 class Changes(Shown):
@@ -118,7 +124,7 @@ def changes_of(snapshots: Sequence[Snapshot]) -> Changes:
     ]
     return Changes(
         tuple(each.name for each in snapshots),
-        tuple(sorted(tested, key=lambda each: each.p_value)),
+        tuple(sorted(tested, key=lambda each: (each.p_value, -abs(each.steps)))),
         tuple(columns),
         {name: tuple(map(float, x)) for name, x in columns.items()},
         tuple(each.epoch for each in snapshots),
@@ -240,9 +246,12 @@ def _quantity(kind: str, label: str) -> str:
 
 
 def of_diagnosis(name: str, found: Diagnosis) -> Snapshot:
-    """Base parameters, the data-sheet lines of friction, and all other named effects."""
+    """Base parameters, the data-sheet lines of friction, and all other named effects.
+
+    A base parameter has the name of its first term, as in a fit.
+    """
     known = {
-        base: Known(float(value), float(std))
+        base.split()[0]: Known(float(value), float(std), _unit_of(base))
         for base, value, std in zip(
             found.base_names, found.base_values, found.base_std, strict=True
         )
@@ -267,6 +276,12 @@ def of_diagnosis(name: str, found: Diagnosis) -> Snapshot:
                     _quantity(effect.kind, label), kind_named(effect.kind).friction,
                 )  # fmt: skip
     return Snapshot(name, known, found.recorded.epoch, found.recorded.covariates)
+
+
+def _unit_of(base: str) -> str:
+    """The unit of a base parameter by the name of its first term, as `mz[elbow]`."""
+    name = base.split("[")[0]
+    return standard_parameter_unit(PARAMETER_NAMES.index(name)) if name in PARAMETER_NAMES else ""
 
 
 def of_score(name: str, score: Score) -> list[Snapshot]:

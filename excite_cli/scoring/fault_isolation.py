@@ -13,18 +13,22 @@ from dataclasses import replace
 import numpy as np
 
 from excite_cli.diagnosis.candidates import record_of
+from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.effects.catalogue import catalogue
+from excite_cli.effects.judgement import Seen
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.regression import seen_of, with_effects
+from excite_cli.robot.carried_payload import reach
 from excite_cli.robot.model import Array, Robot
 from excite_cli.scoring.records import RunExplanation
 
 _MOST = 3  # reasons
 _LEAST = 0.15  # of what is too much, that a reason must explain
 _ENOUGH = 0.1  # of it left: the rest needs no reason
+_FAR = 0.5  # of the robot's reach (or 1 m), that a payload's centre may be off its link
 _SAMPLES = 3000  # of a run
 
 
@@ -34,8 +38,8 @@ def reasons_of(
     run: PreparedRun,
     allowed: Array,
     correlated: float,
-) -> tuple[RunExplanation, ...]:
-    """What explains the residual of `run` beside `model`, the strongest first.
+) -> tuple[tuple[RunExplanation, ...], float]:
+    """What explains the residual of `run` beside `model`, the strongest first; share that is left.
 
     `allowed` RMS (n,); `correlated`: how many samples carry the information of one.
     """
@@ -59,7 +63,8 @@ def reasons_of(
         left = residual.ravel() - columns @ _solved(columns, residual.ravel())[0]
         if float(left @ left) - (first - excess) < _ENOUGH * excess:
             break
-    return _told(robot, residual.ravel(), taken, first, correlated)
+    told = _told(robot, residual.ravel(), taken, first, correlated)
+    return told, float(left @ left) / max(first, 1e-30)
 
 
 def _best(
@@ -77,6 +82,13 @@ def _best(
     count = float((scale > 0).sum()) / correlated
     places = {effect.place for effect, _ in taken}
     every = max(1, len(run.tau_fit) // _SAMPLES)
+    body = signals.body
+    seen = Seen(
+        np.where(run.usable, np.abs(run.tau_fit), 0.0).max(axis=0, initial=0.0),
+        np.sqrt(np.mean(np.square(body.load), axis=0)),
+        float(np.abs(body.phi[::PARAMETERS_PER_BODY]).sum()),
+        _FAR * max(reach(robot.model), 1.0),
+    )
     for effect in _candidates(robot, run, signals, left):
         if effect.place in places:
             continue
@@ -90,6 +102,8 @@ def _best(
         own_values = values[beside.shape[1] :]
         own_covariance = correlated * covariance[beside.shape[1] :, beside.shape[1] :]
         if not _possible(effect, own_values, own_covariance):
+            continue
+        if effect.carried and effect.absurd(own_values, seen):
             continue
         rest = left.ravel() - together @ values
         gain = float(left.ravel() @ left.ravel() - rest @ rest)

@@ -1,6 +1,7 @@
 """What changed between days, in sentences, a table and as data."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,36 +31,38 @@ def changes_answer(found: Changes, page: str | Path | None = None) -> Answer:
 
 def changes_parts(found: Changes) -> Parts:
     """A sentence, and the parameters, the surest change first."""
-    table = changes_table(found)
-    left = len(found.changes) - len(table.rows)
+    tables = changes_tables(found)
+    left = len(found.changes) - sum(len(table.rows) for table in tables)
     rest = [f"{left} more parameters did not change significantly."] if left else []
-    return [*sentences(found), table, *rest]
+    return [*sentences(found), *tables, *rest]
 
 
-def changes_table(found: Changes) -> Table:
+def changes_tables(found: Changes) -> list[Table]:
     """The parameters that changed, and some that did not."""
-    return _table(found.changes[: max(_SHOWN, len(found.significant))])
+    changed, several = found.significant, len(found.days) > 2
+    others = found.changes[len(changed) : max(_SHOWN, len(changed))]
+    tables = [_table(shown, several) for shown in (changed, others) if shown]
+    corrected = "p corrected for the number of parameters and data sets"
+    titles = (f"Changed (± std of the change; {corrected})", "Not significant, the surest first")
+    own = [title for title, shown in zip(titles, (changed, others), strict=True) if shown]
+    return [replace(table, title=title) for table, title in zip(tables, own, strict=True)]
 
 
-def _table(shown: Sequence[Change]) -> Table:
+def _table(shown: Sequence[Change], several: bool = True) -> Table:
+    """`several`: there are more than two days, of which a change is since one."""
     rows = (
         {
             "parameter": change.name,
             "before": f"{change.before:.4g}" if abs(change.before) > 1e-9 * change.std else "0",
             "after": with_deviation(change.after, change.std),
             "unit": change.unit,
-            "since": change.since,
+            **({"since": change.since} if several else {}),
             "p": p_in_words(change.p_value, _LEAST_P) if change.p_value < 0.995 else "1",
-            "verdict": "CHANGED" if change.significant else "",
         }
         for change in shown
     )
-    return Table.of(
-        "Changes (± std of the change; p corrected for the number of parameters and data sets)",
-        rows,
-        left=("parameter", "unit", "since", "verdict"),
-        bold=tuple(k for k, change in enumerate(shown) if change.significant),
-    )
+    bold = tuple(k for k, change in enumerate(shown) if change.significant)
+    return Table.of("", rows, left=("parameter", "unit", "since"), bold=bold)
 
 
 def sentences(found: Changes) -> list[str]:
@@ -68,9 +71,7 @@ def sentences(found: Changes) -> list[str]:
     over = f"{len(found.days)} data sets, {len(found.changes)} parameters{out}"
     if not found.significant:
         return [f"No significant change ({over})."]
-    # Sums of inertial parameters are hard to read: the table has them.
-    short = [each for each in found.significant if " " not in each.name] or found.significant
-    told = [_told(change) for change in short[:_TOLD]]
+    told = [_told(change) for change in found.significant[:_TOLD]]
     more = len(found.significant) - len(told)
     rest = [f"and {more} more"] if more > 0 else []
     return [f"{'; '.join([*told, *rest])} ({over})."]
@@ -78,6 +79,8 @@ def sentences(found: Changes) -> list[str]:
 
 def _told(change: Change) -> str:
     verb = "rose" if change.after > change.before else "fell"
+    if min(change.before, change.after) < 0.0:
+        verb = "changed"  # "rose" would be of the size for one reader, of the value for another
     unit = f" {change.unit}" if change.unit not in ("", "1") else ""
     return (
         f"{change.name} {verb} from {change.before:.3g} to "
@@ -123,7 +126,7 @@ def trend_page(changes: Changes, title: str) -> Page:
                 "parameters that changed", f"{len(changes.significant)} of {len(changes.changes)}"
             ),
         ),
-        (*sections, Section("changes", "Changes", (changes_table(changes),))),
+        (*sections, Section("changes", "Changes", tuple(changes_tables(changes)))),
     )
 
 

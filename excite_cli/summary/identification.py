@@ -373,9 +373,16 @@ show(StoredFit, _in_words, _stored_parts, OF_IDENTIFICATION)
 # What the robot carries, as a table and as data.
 
 
-def load_answer(found: LoadIdentification) -> Answer:
-    """What `excite identify --only payload` answers; status 1 where no body is so."""
-    return Answer(tuple(load_parts(found)), _load_data(found), found.possible)
+def load_answer(
+    found: LoadIdentification, written: Mapping[str, str | Path | None] | None = None
+) -> Answer:
+    """What `excite identify --only payload` answers; status 1 where no body is so.
+
+    `written` are the files that were requested, by kind.
+    """
+    files = {kind: str(path) for kind, path in (written or {}).items() if path is not None}
+    parts = (*load_parts(found), *files_in_words(files))
+    return Answer(parts, {**_load_data(found), "output": files}, found.possible)
 
 
 def load_parts(found: LoadIdentification) -> Parts:

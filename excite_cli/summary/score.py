@@ -11,6 +11,7 @@ from excite_cli.identification.fit_words import short_number
 from excite_cli.report.chart import Colour
 from excite_cli.report.plot import Curve, Panel, Plot
 from excite_cli.scoring.records import RunExplanation, Score, ScoredRun
+from excite_cli.scoring.score import NOT_THIS_ROBOT
 from excite_cli.scoring.thresholds import Thresholds
 from excite_cli.shown.answer import Answer, Charts, KeyFigure, Parts, Section, Table, parts_of, show
 from excite_cli.summary.cells import figure, findings_data, percent
@@ -139,6 +140,11 @@ def in_words(run: ScoredRun, found: Score) -> str:
     if not run.left:
         return "within the model's tolerance"
     beyond = _beyond(run)
+    if not run.reasons and run.error.mean_relative_moving > NOT_THIS_ROBOT:
+        return (
+            f"{beyond}; no payload, friction or other change explains it: these data seem to be of "
+            "another robot"
+        )
     if not run.reasons:
         return f"{beyond}; nothing that changes from day to day explains it"
     return f"{beyond}: {' and '.join(_reason(each, found) for each in run.reasons)}"

@@ -203,3 +203,12 @@ def test_a_job_is_forecast_before_it_is_played(days: Program, two_motions: Run) 
 )
 def test_bad_jobs(days: Program, arguments: tuple[str, ...], told: str) -> None:
     assert told in days.refused(*arguments)
+
+
+def test_a_file_of_other_joints_is_told_as_one_of_another_robot(days: Program) -> None:
+    columns = ["t", *(f"{channel}_axis_{k}" for channel in ("q", "tau") for k in range(1, 6))]
+    rows = [",".join(columns), *(",".join(map(str, [0.01 * k, *[0.1] * 10])) for k in range(400))]
+    (days.folder / "other.csv").write_text("\n".join(rows), encoding="utf-8")
+    run = days("score", "fit.h5", "other.csv")
+    assert run.returncode == 2
+    assert "the data are of another robot than smoke_arm" in run.stderr

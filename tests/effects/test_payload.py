@@ -9,6 +9,7 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.effects.coulomb_friction import CoulombFriction
+from excite_cli.effects.judgement import Seen
 from excite_cli.effects.payload import Payload
 from excite_cli.effects.placing import places_named, told_on
 from excite_cli.errors import ConfigError
@@ -87,3 +88,11 @@ def test_moving_there_and_back_changes_nothing() -> None:
     shift = np.array([0.1, -0.2, 0.3])
     there, back = moved(turn, shift), moved(turn.T, -turn.T @ shift)
     assert back @ there == pytest.approx(np.eye(10), abs=1e-12)
+
+
+def test_what_hangs_too_far_off_or_weighs_nothing_is_no_payload() -> None:
+    seen = Seen(np.ones(2), np.ones(2), 30.0, reach=0.9)
+    load = Payload((1,), {}, ())
+    assert load.absurd(Payload.planted(1.5, {"cz": 0.3})[1], seen) == ""
+    assert "1.8 m off" in load.absurd(Payload.planted(1.5, {"cz": 1.8})[1], seen)
+    assert "next to nothing" in load.absurd(Payload.planted(0.003, {"cz": 1.8})[1], seen)

@@ -1,5 +1,6 @@
 """What the robot carries, beside a fit of the robot alone; data from MuJoCo, by the user's path."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -110,6 +111,21 @@ def test_mass_centre_and_inertia(case: Case, loaded: Dataset, fit: Path) -> None
         assert vague[name].std > 1.2 * sure[name].std
     assert quiet["mass"].std >= 1e-3 * quiet["mass"].value
     assert min(quiet[name].std for name in ("cx", "cy", "cz")) >= 1e-4
+
+
+def test_the_load_as_a_controller_reads_it(
+    case: Case, loaded: Dataset, fit: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(ConfigError, match="links named …tool0"):
+        identify_load(case, loaded, fit, ur=tmp_path / "load.script")
+    identify_load(case, loaded, fit, "tool", ur=tmp_path / "a.script", franka=tmp_path / "a.json")
+    told = json.loads((tmp_path / "a.json").read_text())
+    assert told["mass"] == pytest.approx(MASS, rel=0.01)
+    assert told["centerOfMass"] == pytest.approx(CENTRE, abs=3e-3)
+    begin = f"set_target_payload({told['mass']}, [{told['centerOfMass'][0]}, "
+    assert (tmp_path / "a.script").read_text().startswith(begin)
+    with pytest.raises(FileError, match="exists already"):
+        identify_load(case, loaded, fit, "tool", ur=tmp_path / "a.script")
 
 
 def test_nothing_carried_is_told_as_nothing_and_a_changed_robot_as_that(

@@ -1,9 +1,15 @@
 """Changes over days: found with their day and size, and none where nothing changed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from excite_cli.scoring.changes import Known, Snapshot, changes_of
+from excite_cli.diagnosis.records import FrictionLine
+from excite_cli.effects.parameter import Value
+from excite_cli.scoring.changes import Known, Snapshot, changes_of, of_diagnosis
+from excite_cli.summary.changes import changes_tables, sentences
+from tests.diagnosis.synthetic_diagnosis import make_diagnosis
 
 DAYS = 12
 
@@ -81,3 +87,39 @@ def test_two_days_are_a_difference() -> None:
     assert (change.name, change.before, change.since) == ("e", pytest.approx(0.0), "d4")
     (other,) = [each for each in found.changes if each.name == "b"]
     assert np.isnan(other.values[:4]).all()
+
+
+def test_what_changed_most_is_told_first_and_rows_fit_on_a_terminal() -> None:
+    """Names of diagnoses are long sums; p of sure changes is too small a number to tell apart."""
+    total = (
+        "Izz[shoulder_lift_joint] + Ixx[elbow_joint] - 0.008·m[wrist_1_joint] - Iyy[elbow_joint]"
+    )
+
+    def day(name: str, friction: float, inertia: float) -> Snapshot:
+        viscous, coulomb = Value(1.0, 1e-3, "N·m·s/rad"), Value(friction, 1e-3, "N·m")
+        line = FrictionLine("shoulder_lift_joint", viscous, coulomb, curved=False)
+        return of_diagnosis(
+            name,
+            replace(
+                make_diagnosis(),
+                base_names=(total,),
+                base_values=np.array([inertia]),
+                base_std=np.array([1e-3]),
+                effects=(),
+                friction_lines=(line,),
+            ),
+        )
+
+    found = changes_of([day("january", 1.0, -0.0288), day("february", 2.0, -0.0738)])
+    first, second = found.significant
+    assert [first.name, second.name] == [
+        "Coulomb friction[shoulder_lift_joint]",
+        "Izz[shoulder_lift_joint]",
+    ]
+    (told, *_) = sentences(found)
+    assert told.startswith("Coulomb friction[shoulder_lift_joint] rose from 1 to 2.0")
+    assert "Izz[shoulder_lift_joint] changed from -0.0288 to -0.0738" in told
+    assert "kg·m² since february" in told
+    for table in changes_tables(found):
+        widths = [max(map(len, column)) for column in zip(table.columns, *table.rows, strict=True)]
+        assert sum(widths) + 2 * (len(widths) - 1) <= 100

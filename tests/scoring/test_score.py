@@ -7,8 +7,9 @@ import pytest
 
 from excite_cli.diagnosis.records import EffectRecord
 from excite_cli.identification.errors_of_torque import Errors
-from excite_cli.scoring.records import RunExplanation, ScoredRun
+from excite_cli.scoring.records import RunExplanation, Score, ScoredRun
 from excite_cli.scoring.score import shift_of, with_shift
+from excite_cli.summary.score import in_words
 
 NAMES = ("a", "b", "c", "d", "e", "f")
 NOTHING = Errors(0.1, 0.1, {}, {}, {}, {}, (0.0, 0.0), {}, {})
@@ -84,3 +85,11 @@ def test_a_common_reason_makes_alarms_and_none_makes_a_question() -> None:
     found, findings = with_shift(given, shift, other)
     assert found == given
     assert "Did the motion change?" in findings[0].text
+
+
+def test_data_that_nothing_explains_are_said_to_be_of_another_robot() -> None:
+    one = replace(run(0, np.full(6, 9.0), alarm=True), peak=dict.fromkeys(NAMES, 9.0))
+    score = Score("model.h5", "fit", NAMES, ("N·m",) * 6, (one,), NOTHING, NOTHING)
+    assert "nothing that changes" in in_words(one, score)
+    wrong = replace(one, error=replace(NOTHING, mean_relative_moving=1.15))
+    assert in_words(wrong, score).endswith("these data seem to be of another robot")
