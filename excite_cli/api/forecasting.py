@@ -54,7 +54,7 @@ def forecast(model: Model | str | Path, job: Motions, *, tell: Tell = log_note) 
         str(job) if isinstance(job, str | Path) else "",
         seconds,
         dict(zip(given.joint_names, joints, strict=True)),
-        None if stored.error is None else stored.error.mean_relative_moving,
+        None if stored.error is None else stored.error.mean_relative,
         torque_units(stored.robot),
     )
 

@@ -34,7 +34,7 @@ def test_it_is_about_what_is_then_measured(loop: Loop, tmp_path: Path) -> None:
     new = simulate(loop.problem, loop.result, ["coulomb_friction@elbow=2"], again)
     measured = score(tmp_path / "fit.h5", new.dataset)
     for name, joint in found.joints.items():
-        ratio = joint.share / measured.error.relative_moving[name]
+        ratio = joint.share / measured.error.relative[name]
         assert 1 / 1.5 < ratio < 1.5, name
     assert found.good
     assert not found.outside

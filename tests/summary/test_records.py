@@ -65,7 +65,7 @@ SCORED = ScoredRun(
 THRESHOLDS = Thresholds(("a", "b"), np.ones((2, 4)), np.array([3.0, 4.0]), 0.5, 0.02)
 # Settings, and records of a few words, which Python itself shows well.
 SHORT = {"Drawing", "Exported", "Level", "Note", "Report", "Serving", "SimulationSettings", "View"}
-SHORT |= {"Take", "Answer", "CaseRecord"}
+SHORT |= {"Take", "Answer", "CaseRecord", "SelftestCase"}
 BRIEF = ["optimizer.max_iterations=6", "sequence.motions=1"]
 
 
