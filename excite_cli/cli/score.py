@@ -63,7 +63,7 @@ def score(
         _forecast(terminal, model, job, data, output, limits)
         return
     if not data:
-        raise ConfigError("DATA: give measured data, or --job with a motion to come.")
+        raise ConfigError("DATA is missing: give measured data, or --job with a motion to come.")
     with (
         working(workers, scheduler, 1, terminal.tell) as place,
         terminal.live("score", len(data)) as line,

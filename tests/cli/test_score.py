@@ -196,7 +196,7 @@ def test_a_job_is_forecast_before_it_is_played(days: Program, two_motions: Run) 
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (("score", "fit.h5"), "DATA: give measured data, or --job"),
+        (("score", "fit.h5"), "DATA is missing: give measured data, or --job"),
         (("score", "fit.h5", "sound.h5", "--job", "sound.h5"), "--job: it takes no measured data"),
         (("score", "fit.h5", "--job", "none.csv"), "none.csv"),
     ],
