@@ -34,7 +34,8 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.excitation.run import continue_run, new_result
 from excite_cli.excitation.solvers.interior_point import InteriorPoint
-from excite_cli.workers.base import Function, Here, News, Watch, Workers, unwatched
+from excite_cli.shown.note import unheard
+from excite_cli.workers.base import Function, Here, News, Watch, Workers
 from excite_cli.workers.processes import Processes
 
 GOAL = 1.8
@@ -52,7 +53,7 @@ class Timed:
         self.starts: list[float] = []
 
     def map(
-        self, function: Function, shared: Any, tasks: Sequence[Any], watch: Watch = unwatched
+        self, function: Function, shared: Any, tasks: Sequence[Any], watch: Watch = unheard
     ) -> list[Any]:
         def seen(news: News) -> None:
             if isinstance(news.result, FoundMotion):
