@@ -12,7 +12,9 @@ import pytest
 from excite_cli.api.model import Model
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
+from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import ConfigError
+from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.regression import Series, effect_columns, signals_of, with_effects
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.robot.model import Array
@@ -85,6 +87,22 @@ def test_parameters_count_by_their_covariance(loop: Loop) -> None:
     # The prior of the bodies narrows the covariance a little.
     assert np.all(found < 1.001 * expected)
     assert np.median(found / expected) > 0.9
+
+
+def test_no_effect_is_unsure_by_more_than_all_torque_of_its_joint(loop: Loop) -> None:
+    """Nothing is known of the size of its dry friction."""
+    made = Model.load(loop.fit).made
+    size = find_base_parameters(made.robot).rank
+    bare = replace(made, model=made.model.without(made.model.effects), factor=1e6 * np.eye(size))
+    rubbing = IdentifiedModel(made.model.phi, (kind_named("coulomb_friction")((0,)),), np.ones(1))
+    factor = np.pad(1e6 * np.eye(size), ((0, 1), (0, 1)))
+    q, v, a = made.robot.draw_states(50, seed=3)
+    series = Series(0.01 * np.arange(50), q, v, a)
+    found = Trust(replace(bare, model=rubbing, factor=factor)).by_parameters(series)
+    assert Trust(bare).by_parameters(series).max() < 1e-3
+    torque = np.sqrt(np.nanmean(np.concatenate([np.square(t.measured) for t in made.traces]), 0))
+    assert found[:, 0].max() == pytest.approx(torque[0], rel=0.2)
+    assert found[:, 1].max() < 1e-3
 
 
 def test_models_say_it_beside_the_torque(loop: Loop) -> None:
