@@ -11,7 +11,7 @@ from excite_cli.api.motions import Motions, load_motions
 from excite_cli.identification.regression import Series
 from excite_cli.identification.torque_trace import torque_units
 from excite_cli.scoring.forecast import Forecast, joint_forecasts
-from excite_cli.scoring.validity import Trust
+from excite_cli.scoring.validity import States, Trust, states_of
 from excite_cli.shown.note import Tell, log_note
 from excite_cli.summary.forecast import forecast_answer as forecast_answer
 from excite_cli.trajectory.fade import Segment
@@ -26,7 +26,7 @@ def forecast(model: Model | str | Path, job: Motions, *, tell: Tell = log_note) 
 
     `job` is what `load_motions` takes: a plan in a controller's format (CSV, ROS 2, MoveIt …), a
     result, or a log, whose motion is taken. Expected is the standard deviation of `Model.torque(…,
-    std=True)` along it, as RMS.
+    std=True)` along it, as RMS where the joints move.
 
     Raises
     ------
@@ -45,16 +45,15 @@ def forecast(model: Model | str | Path, job: Motions, *, tell: Tell = log_note) 
         series = _series(each, min(_RATE, _MOST / seconds))
         given.torque(series.q[:2], series.v[:2], series.a[:2], series.t[:2])  # it can be asked
         found = model_of_all_runs.predicted(stored.robot, series)
-        deviation = trust.deviation(series, found.load)
-        parts.append((series.q, series.v, found.load, found.torque, deviation))
-    along = (np.concatenate(part) for part in zip(*parts, strict=True))
-    joints = joint_forecasts(trust.validity, *along)
+        parts.append((*vars(states_of(series, found)).values(), trust.deviation(series, found)))
+    *states, deviation = (np.concatenate(part) for part in zip(*parts, strict=True))
+    joints = joint_forecasts(trust.validity, States(*states), deviation)
     return Forecast(
         str(stored.path),
         str(job) if isinstance(job, str | Path) else "",
         seconds,
         dict(zip(given.joint_names, joints, strict=True)),
-        None if stored.error is None else stored.error.mean_relative,
+        None if stored.error is None else stored.error.mean_relative_moving,
         torque_units(stored.robot),
     )
 

@@ -174,7 +174,7 @@ class Model(Shown):
         torque = found.torque[0] if single else found.torque
         if not std:
             return torque
-        deviation = self._trust.deviation(series, found.load)
+        deviation = self._trust.deviation(series, found)
         return torque, deviation[0] if single else deviation
 
     @cached_property

@@ -103,7 +103,7 @@ def thresholds_of(
         square = np.concatenate([np.square(x[:, j]) for x in smooth])
         speed = np.concatenate([run.speed[:, j] for run in runs])
         load = np.concatenate([run.load[:, j] for run in runs])
-        coefficients[j] = speed_and_load_squares(square, speed, load)
+        coefficients[j] = variance_coefficients(_columns(speed, load), square)
     maxima = []
     for run, x in zip(runs, smooth, strict=True):
         ratio = np.abs(x) / np.sqrt(squares_of(coefficients, run.speed, run.load))
@@ -128,26 +128,23 @@ def low_pass(x: Array, step: float, time_constant: float) -> Array:
     return np.asarray(lfilter([share], [1.0, share - 1.0], x, axis=0, zi=begin)[0])
 
 
-def speed_and_load_squares(
-    squares: Array, speed: Array, load: Array, width: float = REVERSAL
-) -> Array:
-    """c₀ … c₃ (4,) of s² by least squares of residuals' `squares` (m,), as above; w is `width`."""
-    columns = _columns(speed, load, width)
-    mean = float(squares.mean())
-    size = np.maximum(columns.mean(axis=0), 1e-300)
+def variance_coefficients(columns: Array, squares: Array) -> Array:
+    """c ≥ 0 (k,) of s² = columns (m, k) · c by least squares of residuals' `squares` (m,).
+
+    c₀ is at least a thousandth of their mean.
+    """
+    mean, size = float(squares.mean()), np.maximum(columns.mean(axis=0), 1e-300)
     found, _ = nnls(columns / size, squares / max(mean, 1e-300))
     coefficients = np.asarray(found / size * mean)
     coefficients[0] = max(coefficients[0], _LEAST * mean)
     return coefficients
 
 
-def squares_of(
-    coefficients: Array, speed: Array, load: Array, width: float | Array = REVERSAL
-) -> Array:
-    """s² (T, n) of coefficients (n, 4), speeds and loads (T, n); w is `width` (n,)."""
-    return np.einsum("tjc,jc->tj", _columns(speed, load, width), coefficients)
+def squares_of(coefficients: Array, speed: Array, load: Array) -> Array:
+    """s² (T, n) of coefficients (n, 4), speeds and loads (T, n)."""
+    return np.einsum("tjc,jc->tj", _columns(speed, load), coefficients)
 
 
-def _columns(speed: Array, load: Array, width: float | Array) -> Array:
-    reversal = np.exp(-np.square(speed / width))
+def _columns(speed: Array, load: Array) -> Array:
+    reversal = np.exp(-np.square(speed / REVERSAL))
     return np.stack([np.ones_like(speed), speed**2, load**2, reversal], axis=-1)

@@ -1,19 +1,24 @@
 """Where a model can be trusted: the standard deviation of the torque that it predicts for a state.
 
 What a model left of its own data says it where these data are; outside of them it leaves more. Of
-joint j at speed v and rigid-body torque `load`,
+joint j that moves with speed v, acceleration a and rigid-body torque `load`,
 
-    s² = (r²/5 + ⅘ (c₀ + c₁ v² + c₂ load² + c₃ exp(−(v/w)²))) g² + d²,
+    s² = (r²/5 + ⅘ (c₀ + c₁ v² + c₂ load² + c₃ ρ²)) g² + d² + D²/10,    ρ = 1 / (1 + (v/(a T))²),
     g = max(1, |v| / v₉₉, |load| / load₉₉),    d² = xᵀ C x,
+    D = τ − load − (f_v v + f_c sgn v + i a + τ₀ + k q + κ load),
 
-with r² the mean square of the residuals, c ≥ 0 by least squares of their squares (as of a collision
-detector, `thresholds`; a fifth of them is taken as everywhere, since what a model lacks shows
-elsewhere on another motion), w a twentieth of the joint's RMS speed, and v₉₉, load₉₉ what 99 % of
-the own data are below. d is the standard deviation of the torque by the covariance C of the
-parameters, x their columns.
+with r² the mean square of the residuals, c ≥ 0 by least squares of their squares (`thresholds`; a
+fifth of them is taken as everywhere, since what a model lacks shows elsewhere on another motion),
+and v₉₉, load₉₉ what 99 % of the own data are below. A joint reverses v/a from now or before: ρ is 1
+if that is short beside T, by which filters smear a reversal. d is the standard deviation of the
+torque by the covariance C of the parameters, x their columns. D is what the effects add to the
+straight function that is nearest to them in the own data: what the form of a curve says elsewhere
+is uncertain however well its size is known. Where the joint stands (|v| ≤ v_m), friction is
+anything up to ±f_c, which has the variance f_c²/3: that stands for D²/10, and the bracket is the
+mean square of the residuals at standstill if that is more.
 
 The residual holds noise and effects that the model lacks, so that s is of a torque as it will be
-measured, also where a joint stands or reverses and its friction is anything.
+measured.
 """
 
 from collections.abc import Sequence
@@ -29,6 +34,8 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.errors import ConfigError
 from excite_cli.identification.errors_of_torque import FEWEST
 from excite_cli.identification.factors import triangle_of
+from excite_cli.identification.identified_model import Prediction
+from excite_cli.identification.processing import DEFAULT_MOVING, GAUSSIAN, Processing
 from excite_cli.identification.regression import (
     Series,
     effect_columns,
@@ -40,31 +47,50 @@ from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.identification.uncertain_model import from_information
 from excite_cli.measurement.run_identity import RunId
 from excite_cli.robot.model import Array
-from excite_cli.scoring.thresholds import speed_and_load_squares, squares_of
+from excite_cli.scoring.thresholds import variance_coefficients
 
-_REVERSAL = 0.05  # of a joint's RMS speed: below it friction is known least
 _RANGE = 0.99  # quantile of the own data: beyond it a state is outside
-# Share of the mean square. Of 14 simulated robots as they are, four motions each that took no part:
-# with none 1.96 s hold 87 to 89 % of the samples (means over the robots, by kind of motion), with
-# this 95 to 97, and RMS errors are within a factor of 1.5 of the predicted ones in 47 of 56.
+# Of 29 simulated robots as they are, four motions each that took no part (docs/decisions/
+# where-a-model-is-valid.md). Share of the mean square, and of the squared difference from the line:
 _MEAN = 0.2
+_CURVE = 0.1
+_SHARP = 12.0  # Hz: cut-off of torques that no filter averages
+_REVERSES = 0.5  # ρ that some sample must have, or the data show no reversal
 _AT_ONCE = 2000  # states whose columns are in memory
+
+
+_NAMES = ("q", "v", "a", "load", "predicted")  # of traces, for `States`
+
+
+@dataclass(frozen=True)
+class States:
+    """What a model is asked for: `q`, `v`, `a`; its rigid-body `load` and `torque`; all (T, n)."""
+
+    q: Array
+    v: Array
+    a: Array
+    load: Array
+    torque: Array
 
 
 @dataclass(frozen=True)
 class Validity:
-    """What a model leaves, by joint (n,): `coefficients` (n, 4) and `width` w.
+    """What a model leaves, by joint (n,): `coefficients` (n, 4), `standing` mean square at rest.
 
-    The share of r² is in the first coefficient. `speed` v₉₉ and `load` load₉₉; `lower` and `upper`
-    positions. NaN of joints without enough samples.
+    The share of r² is in the first coefficient. `line` (n, 6): f_v, f_c, i, τ₀, k, κ. `speed` v₉₉,
+    `load` load₉₉; `lower` and `upper` positions. `moving` v_m, `smear` T [s]. NaN of joints without
+    enough samples.
     """
 
     coefficients: Array
-    width: Array
+    standing: Array
+    line: Array
     speed: Array
     load: Array
     lower: Array
     upper: Array
+    moving: float
+    smear: float
 
     def beyond(self, v: Array, load: Array) -> tuple[Array, Array]:
         """|v| / v₉₉ and |load| / load₉₉ (T, n): above 1 a state is outside of the own data."""
@@ -77,33 +103,73 @@ class Validity:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.abs(q - middle) / half
 
-    def deviation(self, v: Array, load: Array, d: Array) -> Array:
+    def moves(self, v: Array) -> Array:
+        """Where joints move (T, n)."""
+        return np.asarray(np.abs(v) > self.moving)
+
+    def deviation(self, states: States, d: Array) -> Array:
         """s (T, n) [N·m] (N)."""
-        squares = squares_of(self.coefficients, v, load, self.width)
-        farther = np.fmax(1.0, np.fmax(*self.beyond(v, load)))
-        return np.asarray(np.sqrt(squares * farther**2 + d**2))
+        v, load = states.v, states.load
+        left = np.einsum("tjc,jc->tj", _columns(states, self.smear), self.coefficients)
+        curve = states.torque - load - np.einsum("tjc,jc->tj", _line(states), self.line)
+        farther = np.square(np.fmax(1.0, np.fmax(*self.beyond(v, load))))
+        moves = left * farther + _CURVE * np.square(curve)
+        stands = np.maximum(left, self.standing) * farther + np.square(self.line[:, 1]) / 3.0
+        return np.asarray(np.sqrt(np.where(self.moves(v), moves, stands) + d**2))
 
 
-def validity_of(traces: Sequence[TorqueTrace]) -> Validity:
-    """From the traces of a model's own data."""
-    n = traces[0].v.shape[1]
-    q, v, load = (np.concatenate([getattr(t, name) for t in traces]) for name in ("q", "v", "load"))
-    left = np.concatenate([t.measured - t.predicted for t in traces])
-    numbers = [_of_joint(v[:, j], load[:, j], left[:, j]) for j in range(n)]
-    coefficients, width, fastest, heaviest = map(np.array, zip(*numbers, strict=True))
-    return Validity(coefficients, width, fastest, heaviest, q.min(axis=0), q.max(axis=0))
+def _columns(states: States, smear: float) -> Array:
+    """1, v², load², ρ² (T, n, 4)."""
+    way = np.square(smear * states.a)
+    reversal = way / np.maximum(way + states.v**2, 1e-300)
+    one = np.ones_like(states.v)
+    return np.stack([one, states.v**2, states.load**2, reversal**2], axis=-1)
 
 
-def _of_joint(v: Array, load: Array, left: Array) -> tuple[Array, float, float, float]:
-    known = np.isfinite(left)
-    if known.sum() < FEWEST:
-        return np.full(4, nan), nan, nan, nan
-    v, load, squares = v[known], load[known], np.square(left[known])
-    width = _REVERSAL * float(np.sqrt(np.mean(np.square(v))))
-    coefficients = (1.0 - _MEAN) * speed_and_load_squares(squares, v, load, width)
+def _line(states: States) -> Array:
+    """v, sgn v, a, 1, q, load (T, n, 6)."""
+    q, v, a = states.q, states.v, states.a
+    return np.stack([v, np.sign(v), a, np.ones_like(v), q, states.load], axis=-1)
+
+
+def validity_of(traces: Sequence[TorqueTrace], processing: Processing | None) -> Validity:
+    """From the traces of a model's own data, which were filtered by `processing`."""
+    smear = GAUSSIAN / ((processing and processing.parallel_cutoff) or _SHARP)
+    moving = processing.moving_speed if processing else DEFAULT_MOVING
+    own = States(*(np.concatenate([getattr(t, name) for t in traces]) for name in _NAMES))
+    left = np.concatenate([t.measured for t in traces]) - own.torque
+    columns, line, added = _columns(own, smear), _line(own), own.torque - own.load
+    numbers = []
+    for j in range(left.shape[1]):
+        known = np.isfinite(left[:, j])
+        moves = known & (np.abs(own.v[:, j]) > moving)
+        stands = known & ~moves
+        if known.sum() < FEWEST:
+            numbers.append((np.full(4, nan), nan, np.full(6, nan), nan, nan))
+            continue
+        counted = moves if moves.sum() >= FEWEST else known
+        variances = _variances(columns[counted, j], left[counted, j])
+        at_rest = np.mean(np.square(left[stands, j])) if stands.sum() >= FEWEST else 0.0
+        straight = np.linalg.lstsq(line[counted, j], added[counted, j])[0]
+        most = (np.quantile(np.abs(x[known, j]), _RANGE) for x in (own.v, own.load))
+        numbers.append((variances, at_rest, straight, *most))
+    coefficients, standing, nearest, speed, load = map(np.array, zip(*numbers, strict=True))
+    lower, upper = own.q.min(axis=0), own.q.max(axis=0)
+    return Validity(coefficients, standing, nearest, speed, load, lower, upper, moving, smear)
+
+
+def _variances(columns: Array, left: Array) -> Array:
+    """c₀ … c₃ (4,), with the share of the mean square in c₀."""
+    squares = np.square(left)
+    columns = columns * [1.0, 1.0, 1.0, columns[:, 3].max() > _REVERSES**2]
+    coefficients = (1.0 - _MEAN) * variance_coefficients(columns, squares)
     coefficients[0] += _MEAN * squares.mean()
-    fastest, heaviest = (float(np.quantile(np.abs(x), _RANGE)) for x in (v, load))
-    return coefficients, width, fastest, heaviest
+    return coefficients
+
+
+def states_of(series: Series, found: Prediction) -> States:
+    """Of a series and what a model predicts for it."""
+    return States(series.q, series.v, series.a, found.load, found.torque)
 
 
 class Trust:
@@ -117,12 +183,12 @@ class Trust:
                 "identify -o) or the diagnosis (excite diagnose -o) itself."
             )
         self._robot, self._model = stored.robot, stored.model
-        self.validity = validity_of(stored.traces)
+        self.validity = validity_of(stored.traces, stored.processing)
         self._root = self._root_of(stored)
 
-    def deviation(self, series: Series, load: Array) -> Array:
-        """s (T, n) [N·m] (N) of the torque, beside the model's `load` (T, n)."""
-        return self.validity.deviation(series.v, load, self.by_parameters(series))
+    def deviation(self, series: Series, found: Prediction) -> Array:
+        """s (T, n) [N·m] (N) of the torque that was `found`."""
+        return self.validity.deviation(states_of(series, found), self.by_parameters(series))
 
     def by_parameters(self, series: Series) -> Array:
         """d (T, n) [N·m] (N): of the torque by the covariance of the parameters; 0 if unknown."""

@@ -31,7 +31,10 @@ def forecast_parts(found: Forecast) -> Parts:
         for (name, each), unit in zip(found.joints.items(), found.torque_units, strict=True)
     )
     left = ("joint", "outside the model's data")
-    note = "expected error: noise, parameters, and what the model lacks, as one standard deviation"
+    note = (
+        "where the joint moves. expected error: noise, parameters, what the model lacks, as one "
+        "standard deviation"
+    )
     return [
         _sentence(found),
         Table("", names, rows, left=left, words=left[1:], note=note),
@@ -40,7 +43,7 @@ def forecast_parts(found: Forecast) -> Parts:
 
 def _sentence(found: Forecast) -> str:
     made = "" if found.made is None else f" ({percent(found.made)} on its own held-out data)"
-    told = f"Expect an error of {percent(found.mean_share)} of the torque{made}."
+    told = f"Expect an error of {percent(found.mean_share)} of the torque where joints move{made}."
     if not found.outside:
         return f"{told} All joints stay within the positions, speeds and loads of the model's data."
     more = len(found.outside) - _NAMED

@@ -15,16 +15,18 @@ from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import ConfigError
 from excite_cli.identification.identified_model import IdentifiedModel
+from excite_cli.identification.processing import Processing
 from excite_cli.identification.regression import Series, effect_columns, signals_of, with_effects
 from excite_cli.identification.torque_trace import TorqueTrace
 from excite_cli.robot.model import Array
-from excite_cli.scoring.validity import Trust, validity_of
+from excite_cli.scoring.validity import States, Trust, Validity, validity_of
 from excite_cli.store.fit_file import read_fit
 from tests.api.conftest import Loop
 from tests.api.conftest import loop as loop
 
 RNG = np.random.default_rng(5)
 SIZE = 2000
+FILTERED = Processing(500.0, 8.0, 4.0, 16.0, 1, 0.1, "central", 0.02, 1.0)
 
 
 def trace(size: Array | float) -> TorqueTrace:
@@ -38,8 +40,14 @@ def trace(size: Array | float) -> TorqueTrace:
 
 
 def deviation(traces: list[TorqueTrace], v: float, load: float, d: float = 0.0) -> Array:
-    at = np.ones((1, 2))
-    return validity_of(traces).deviation(v * at, load * at, d * at)[0]
+    return said(validity_of(traces, None), v=v, load=load, torque=load, d=d)
+
+
+def said(validity: Validity, d: float = 0.0, **at: float) -> Array:
+    """Deviations (2,) in a state of both joints; what is not given is 0."""
+    zero = dict.fromkeys(("q", "v", "a", "load", "torque"), 0.0)
+    states = States(**{name: np.full((1, 2), value) for name, value in (zero | at).items()})
+    return validity.deviation(states, np.full((1, 2), d))[0]
 
 
 def test_it_follows_what_is_left_over_speed_and_load() -> None:
@@ -58,11 +66,43 @@ def test_outside_of_the_data_it_grows_with_the_distance_and_by_parameters_everyw
     assert deviation(made, 3.0, 5.0)[0] > 2.9 * inside[0]
     assert deviation(made, 0.5, 40.0)[0] > 3.9 * inside[0]
     assert deviation(made, 0.5, 5.0, d=1.0) == pytest.approx(np.hypot(inside, 1.0))
-    speeds, loads = validity_of(made).beyond(np.full((1, 2), 2.0), np.full((1, 2), 5.0))
+    speeds, loads = validity_of(made, None).beyond(np.full((1, 2), 2.0), np.full((1, 2), 5.0))
     assert speeds == pytest.approx(np.full((1, 2), 2.0), rel=0.05)
     assert loads == pytest.approx(np.full((1, 2), 0.5), rel=0.05)
-    away = validity_of(made).away(np.array([[0.0, 2.0]]))
+    away = validity_of(made, None).away(np.array([[0.0, 2.0]]))
     assert away == pytest.approx(np.array([[0.0, 2.0]]), abs=0.05)
+
+
+def test_near_a_reversal_it_is_larger_the_longer_filters_smear_it() -> None:
+    made = trace(0.0)
+    a = RNG.uniform(-20.0, 20.0, (SIZE, 2))
+    near = np.abs(made.v) < 0.1325 / 4.0 * np.abs(a)  # a Gaussian average of 4 Hz
+    left = np.where(near, 1.0, 0.1) * RNG.normal(size=(SIZE, 2))
+    validity = validity_of([replace(made, a=a, measured=made.predicted + left)], FILTERED)
+    for slow, fast in ((0.05, 0.9), (-0.05, -0.9)):
+        assert np.all(said(validity, v=slow, a=20.0) > 1.5 * said(validity, v=fast, a=20.0))
+        assert np.all(said(validity, v=slow, a=20.0) > 1.5 * said(validity, v=slow, a=0.0))
+
+
+def test_where_a_joint_stands_its_friction_is_anything() -> None:
+    made = trace(0.1)
+    friction = 0.5 * made.v + 3.0 * np.sign(made.v)
+    shift = {"measured": made.measured + friction, "predicted": made.predicted + friction}
+    validity = validity_of([replace(made, **shift)], None)
+    assert validity.line[:, 1] == pytest.approx([3.0, 3.0])
+    assert said(validity, v=0.0) == pytest.approx(np.hypot(0.1, 3.0 / np.sqrt(3.0)), rel=0.05)
+    assert said(validity, v=0.5, torque=3.25) == pytest.approx(0.1, rel=0.2)
+
+
+def test_a_curve_is_uncertain_where_it_leaves_the_straight_line() -> None:
+    made = trace(0.01)
+    cube = 4.0 * made.v**3
+    validity = validity_of(
+        [replace(made, measured=made.measured + cube, predicted=made.predicted + cube)], None
+    )
+    line = float(validity.line[0, 0] * 2.0 + validity.line[0, 1])
+    curve = 4.0 * 2.0**3 - line
+    assert said(validity, v=2.0, torque=32.0)[0] == pytest.approx(np.sqrt(0.1) * curve, rel=0.05)
 
 
 def test_of_joints_without_samples_nothing_is_known() -> None:
