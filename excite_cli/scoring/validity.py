@@ -3,18 +3,20 @@
 What a model left of its own data says it where these data are; outside of them it leaves more. Of
 joint j that moves with speed v, acceleration a and rigid-body torque `load`,
 
-    s² = (r²/5 + ⅘ (c₀ + c₁ v² + c₂ load² + c₃ ρ²)) g² + d² + D²/10,    ρ = 1 / (1 + (v/(a T))²),
+    s² = (r²/5 + ⅘ (c₀ + c₁ v² + c₂ load² + c₃ ρ²)) h g² + d² + D²/20,    ρ = 1 / (1 + (v/(a T))²),
     g = max(1, |v| / v₉₉, |load| / load₉₉),    d² = xᵀ C x,
     D = τ − load − (f_v v + f_c sgn v + i a + τ₀ + k q + κ load),
 
 with r² the mean square of the residuals, c ≥ 0 by least squares of their squares (`thresholds`; a
-fifth of them is taken as everywhere, since what a model lacks shows elsewhere on another motion),
-and v₉₉, load₉₉ what 99 % of the own data are below. A joint reverses v/a from now or before: ρ is 1
-if that is short beside T, by which filters smear a reversal. d is the standard deviation of the
-torque by the covariance C of the parameters, x their columns. D is what the effects add to the
+fifth of them is taken as everywhere, since what a model lacks shows elsewhere on another motion).
+v₉₉ and load₉₉ are what 99 % of the own data are below; no larger v² and load² count in the bracket.
+h ≥ 1: how many times more a motion that took no part leaves, e²/s² on held-out data, mean over time
+and median over joints, with s of the training data. A joint reverses v/a from now or before: ρ
+is 1 if that is short beside T, by which filters smear a reversal. d is the standard deviation of
+the torque by the covariance C of the parameters, x their columns. D is what the effects add to the
 straight function that is nearest to them in the own data: what the form of a curve says elsewhere
 is uncertain however well its size is known. Where the joint stands (|v| ≤ v_m), friction is
-anything up to ±f_c, which has the variance f_c²/3: that stands for D²/10, and the bracket is the
+anything up to ±f_c, which has the variance f_c²/3: that stands for D²/20, and the bracket is the
 mean square of the residuals at standstill if that is more.
 
 The residual holds noise and effects that the model lacks, so that s is of a torque as it will be
@@ -22,7 +24,7 @@ measured.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan
 
 import numpy as np
@@ -50,10 +52,11 @@ from excite_cli.robot.model import Array
 from excite_cli.scoring.thresholds import variance_coefficients
 
 _RANGE = 0.99  # quantile of the own data: beyond it a state is outside
-# Of 29 simulated robots as they are, four motions each that took no part (docs/decisions/
+# Of 49 simulated robots as they are, four motions each that took no part (docs/decisions/
 # where-a-model-is-valid.md). Share of the mean square, and of the squared difference from the line:
 _MEAN = 0.2
-_CURVE = 0.1
+_CURVE = 0.05
+_MOST = 9.0  # h: more is another fault than a fit's
 _SHARP = 12.0  # Hz: cut-off of torques that no filter averages
 _REVERSES = 0.5  # ρ that some sample must have, or the data show no reversal
 _AT_ONCE = 2000  # states whose columns are in memory
@@ -107,10 +110,17 @@ class Validity:
         """Where joints move (T, n)."""
         return np.asarray(np.abs(v) > self.moving)
 
+    def scaled(self, h: float) -> "Validity":
+        """With h times as large squares of what is left."""
+        return replace(self, coefficients=h * self.coefficients, standing=h * self.standing)
+
     def deviation(self, states: States, d: Array) -> Array:
         """s (T, n) [N·m] (N)."""
         v, load = states.v, states.load
-        left = np.einsum("tjc,jc->tj", _columns(states, self.smear), self.coefficients)
+        inside = np.clip(v, -self.speed, self.speed), np.clip(load, -self.load, self.load)
+        columns = _columns(states, self.smear)
+        columns[..., 1:3] = np.square(np.stack(inside, axis=-1))
+        left = np.einsum("tjc,jc->tj", columns, self.coefficients)
         curve = states.torque - load - np.einsum("tjc,jc->tj", _line(states), self.line)
         farther = np.square(np.fmax(1.0, np.fmax(*self.beyond(v, load))))
         moves = left * farther + _CURVE * np.square(curve)
@@ -172,6 +182,10 @@ def states_of(series: Series, found: Prediction) -> States:
     return States(series.q, series.v, series.a, found.load, found.torque)
 
 
+def _series_of(trace: TorqueTrace) -> Series:
+    return Series(trace.t, trace.q, trace.v, trace.a, RunId(trace.run))
+
+
 class Trust:
     """What is known of the torque that a stored model predicts, for any states."""
 
@@ -183,8 +197,9 @@ class Trust:
                 "identify -o) or the diagnosis (excite diagnose -o) itself."
             )
         self._robot, self._model = stored.robot, stored.model
-        self.validity = validity_of(stored.traces, stored.processing)
         self._root = self._root_of(stored)
+        own = validity_of(stored.traces, stored.processing)
+        self.validity = own.scaled(self._more_on_held_out(stored))
 
     def deviation(self, series: Series, found: Prediction) -> Array:
         """s (T, n) [N·m] (N) of the torque that was `found`."""
@@ -203,6 +218,23 @@ class Trust:
             columns = np.concatenate([body.regressor, effects[part]], axis=2)
             found[part] = np.sqrt(np.square(columns @ self._root).sum(axis=2))
         return found
+
+    def _more_on_held_out(self, stored: StoredModel) -> float:
+        """h, from 1 to `_MOST`; 1 where all data or none are held out."""
+        held = [trace for trace in stored.traces if trace.held_out]
+        others = [trace for trace in stored.traces if not trace.held_out]
+        if not (held and others):
+            return 1.0
+        training, ratios = validity_of(others, stored.processing), []
+        for each in held:
+            states = States(*(getattr(each, name) for name in _NAMES))
+            s = training.deviation(states, self.by_parameters(_series_of(each)))
+            ratio = np.square((each.measured - each.predicted) / s)
+            ratios.append(np.where(training.moves(each.v), ratio, nan))
+        together = np.concatenate(ratios)
+        count = np.isfinite(together).sum(axis=0)
+        mean = np.nansum(together, axis=0)[count >= FEWEST] / count[count >= FEWEST]
+        return float(np.clip(np.median(mean), 1.0, _MOST)) if len(mean) else 1.0
 
     def _effects(self, series: Series) -> Array:
         """Columns (T, n, k) of the effects."""
@@ -230,8 +262,7 @@ class Trust:
         """
         columns, torque = 0.0, 0.0
         for each in traces:
-            series = Series(each.t, each.q, each.v, each.a, RunId(each.run))
-            columns = columns + np.square(self._effects(series)).sum(axis=0)
+            columns = columns + np.square(self._effects(_series_of(each))).sum(axis=0)
             torque = torque + np.square(np.nan_to_num(each.measured)).sum(axis=0)
         share = np.asarray(columns) / np.maximum(np.asarray(torque), 1e-300)[:, None]
         return np.asarray(np.sqrt(share.max(axis=0, initial=0.0)))

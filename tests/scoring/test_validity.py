@@ -84,6 +84,17 @@ def test_near_a_reversal_it_is_larger_the_longer_filters_smear_it() -> None:
         assert np.all(said(validity, v=slow, a=20.0) > 1.5 * said(validity, v=slow, a=0.0))
 
 
+def test_what_held_out_data_left_more_is_expected_everywhere(loop: Loop) -> None:
+    made = Model.load(loop.fit).made
+    training, other = (replace(trace(0.2), held_out=held) for held in (False, True))
+    other = replace(other, measured=other.predicted + 2.0 * (other.measured - other.predicted))
+    alone = replace(made, traces=(training,), factor=None)
+    both = replace(made, traces=(training, other), factor=None)
+    once = validity_of(both.traces, both.processing).coefficients[:, 0]
+    assert Trust(both).validity.coefficients[:, 0] == pytest.approx(4.0 * once, rel=0.15)
+    assert Trust(alone).validity.coefficients[:, 0] == pytest.approx([0.04, 0.01], rel=0.15)
+
+
 def test_where_a_joint_stands_its_friction_is_anything() -> None:
     made = trace(0.1)
     friction = 0.5 * made.v + 3.0 * np.sign(made.v)
@@ -102,7 +113,7 @@ def test_a_curve_is_uncertain_where_it_leaves_the_straight_line() -> None:
     )
     line = float(validity.line[0, 0] * 2.0 + validity.line[0, 1])
     curve = 4.0 * 2.0**3 - line
-    assert said(validity, v=2.0, torque=32.0)[0] == pytest.approx(np.sqrt(0.1) * curve, rel=0.05)
+    assert said(validity, v=2.0, torque=32.0)[0] == pytest.approx(np.sqrt(0.05) * curve, rel=0.05)
 
 
 def test_of_joints_without_samples_nothing_is_known() -> None:
