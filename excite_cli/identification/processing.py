@@ -6,8 +6,9 @@ Gaussian averages at the same instants (parallel filtering): whatever that filte
 model still holds exactly.
 """
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -61,6 +62,15 @@ class Processing:
     def as_data(self) -> dict[str, object]:
         """Plain values for files and JSON."""
         return asdict(self)
+
+
+def processing_of(data: Mapping[str, Any]) -> Processing | None:
+    """From the values of a file; None in files of earlier versions, which do not tell them all."""
+    names = [field.name for field in fields(Processing) if field.name != "reasons"]
+    if not all(name in data for name in names):
+        return None
+    stride = int(data["working_stride"])
+    return Processing(**{**{name: data[name] for name in names}, "working_stride": stride})
 
 
 def choose_processing(

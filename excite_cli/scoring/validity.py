@@ -11,13 +11,13 @@ with r² the mean square of the residuals, c ≥ 0 by least squares of their squ
 fifth of them is taken as everywhere, since what a model lacks shows elsewhere on another motion).
 v₉₉ and load₉₉ are what 99 % of the own data are below; no larger v² and load² count in the bracket.
 h ≥ 1: how many times more a motion that took no part leaves, e²/s² on held-out data, mean over time
-and median over joints, with s of the training data. A joint reverses v/a from now or before: ρ
-is 1 if that is short beside T, by which filters smear a reversal. d is the standard deviation of
-the torque by the covariance C of the parameters, x their columns. D is what the effects add to the
-straight function that is nearest to them in the own data: what the form of a curve says elsewhere
-is uncertain however well its size is known. Where the joint stands (|v| ≤ v_m), friction is
-anything up to ±f_c, which has the variance f_c²/3: that stands for D²/20, and the bracket is the
-mean square of the residuals at standstill if that is more.
+and median over joints, with s of the training data without d. A joint reverses v/a from now or
+before: ρ is 1 if that is short beside T, by which filters smear a reversal. d is the standard
+deviation of the torque by the covariance C of the parameters, x their columns. D is what the
+effects add to the straight function that is nearest to them in the own data: what the form of a
+curve says elsewhere is uncertain however well its size is known. Where the joint stands
+(|v| ≤ v_m), friction is anything up to ±f_c, which has the variance f_c²/3: that stands for D²/20,
+and the bracket is the mean square of the residuals at standstill if that is more.
 
 The residual holds noise and effects that the model lacks, so that s is of a torque as it will be
 measured.
@@ -110,21 +110,21 @@ class Validity:
         """Where joints move (T, n)."""
         return np.asarray(np.abs(v) > self.moving)
 
-    def scaled(self, h: float) -> "Validity":
-        """With h times as large squares of what is left."""
-        return replace(self, coefficients=h * self.coefficients, standing=h * self.standing)
-
-    def deviation(self, states: States, d: Array) -> Array:
-        """s (T, n) [N·m] (N)."""
+    def left(self, states: States) -> Array:
+        """Variance (T, n) of what the model lacks, where joints move: the bracket times h g²."""
         v, load = states.v, states.load
         inside = np.clip(v, -self.speed, self.speed), np.clip(load, -self.load, self.load)
         columns = _columns(states, self.smear)
         columns[..., 1:3] = np.square(np.stack(inside, axis=-1))
-        left = np.einsum("tjc,jc->tj", columns, self.coefficients)
-        curve = states.torque - load - np.einsum("tjc,jc->tj", _line(states), self.line)
         farther = np.square(np.fmax(1.0, np.fmax(*self.beyond(v, load))))
-        moves = left * farther + _CURVE * np.square(curve)
-        stands = np.maximum(left, self.standing) * farther + np.square(self.line[:, 1]) / 3.0
+        return np.asarray(np.einsum("tjc,jc->tj", columns, self.coefficients) * farther)
+
+    def deviation(self, states: States, d: Array | float = 0.0) -> Array:
+        """s (T, n) [N·m] (N)."""
+        v, load, left = states.v, states.load, self.left(states)
+        curve = states.torque - load - np.einsum("tjc,jc->tj", _line(states), self.line)
+        stands = np.maximum(left, self.standing) + np.square(self.line[:, 1]) / 3.0
+        moves = left + _CURVE * np.square(curve)
         return np.asarray(np.sqrt(np.where(self.moves(v), moves, stands) + d**2))
 
 
@@ -144,6 +144,28 @@ def _line(states: States) -> Array:
 
 def validity_of(traces: Sequence[TorqueTrace], processing: Processing | None) -> Validity:
     """From the traces of a model's own data, which were filtered by `processing`."""
+    found = _of_these(traces, processing)
+    held = [trace for trace in traces if trace.held_out]
+    if not held or len(held) == len(traces):
+        return found
+    training = _of_these([trace for trace in traces if not trace.held_out], processing)
+    ratios = np.concatenate([_against(training, trace) for trace in held])
+    count = np.isfinite(ratios).sum(axis=0)
+    enough = count >= FEWEST
+    mean = np.nansum(ratios, axis=0)[enough] / count[enough]
+    h = float(np.clip(np.median(mean), 1.0, _MOST)) if len(mean) else 1.0
+    return replace(found, coefficients=h * found.coefficients, standing=h * found.standing)
+
+
+def _against(validity: Validity, trace: TorqueTrace) -> Array:
+    """e²/s² (T, n) of a trace where joints move, else NaN."""
+    s = validity.deviation(States(*(getattr(trace, name) for name in _NAMES)))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.square((trace.measured - trace.predicted) / s)
+    return np.where(validity.moves(trace.v), ratio, nan)
+
+
+def _of_these(traces: Sequence[TorqueTrace], processing: Processing | None) -> Validity:
     smear = GAUSSIAN / ((processing and processing.parallel_cutoff) or _SHARP)
     moving = processing.moving_speed if processing else DEFAULT_MOVING
     own = States(*(np.concatenate([getattr(t, name) for t in traces]) for name in _NAMES))
@@ -197,9 +219,8 @@ class Trust:
                 "identify -o) or the diagnosis (excite diagnose -o) itself."
             )
         self._robot, self._model = stored.robot, stored.model
+        self.validity = validity_of(stored.traces, stored.processing)
         self._root = self._root_of(stored)
-        own = validity_of(stored.traces, stored.processing)
-        self.validity = own.scaled(self._more_on_held_out(stored))
 
     def deviation(self, series: Series, found: Prediction) -> Array:
         """s (T, n) [N·m] (N) of the torque that was `found`."""
@@ -218,23 +239,6 @@ class Trust:
             columns = np.concatenate([body.regressor, effects[part]], axis=2)
             found[part] = np.sqrt(np.square(columns @ self._root).sum(axis=2))
         return found
-
-    def _more_on_held_out(self, stored: StoredModel) -> float:
-        """h, from 1 to `_MOST`; 1 where all data or none are held out."""
-        held = [trace for trace in stored.traces if trace.held_out]
-        others = [trace for trace in stored.traces if not trace.held_out]
-        if not (held and others):
-            return 1.0
-        training, ratios = validity_of(others, stored.processing), []
-        for each in held:
-            states = States(*(getattr(each, name) for name in _NAMES))
-            s = training.deviation(states, self.by_parameters(_series_of(each)))
-            ratio = np.square((each.measured - each.predicted) / s)
-            ratios.append(np.where(training.moves(each.v), ratio, nan))
-        together = np.concatenate(ratios)
-        count = np.isfinite(together).sum(axis=0)
-        mean = np.nansum(together, axis=0)[count >= FEWEST] / count[count >= FEWEST]
-        return float(np.clip(np.median(mean), 1.0, _MOST)) if len(mean) else 1.0
 
     def _effects(self, series: Series) -> Array:
         """Columns (T, n, k) of the effects."""

@@ -1,6 +1,5 @@
 """Reading models: a fit, a diagnosis, or a config that holds its numbers."""
 
-from dataclasses import fields
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from excite_cli.given_files import require_stored
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.factors import triangle_of
 from excite_cli.identification.identified_model import IdentifiedModel, as_described
-from excite_cli.identification.processing import Processing
+from excite_cli.identification.processing import processing_of
 from excite_cli.identification.stored_model import StoredModel
 from excite_cli.robot.model import Array, Robot, build_measured_robot
 from excite_cli.store.diagnosis_file import is_diagnosis, read_diagnosis
@@ -64,7 +63,7 @@ def _of_fit(path: Path) -> StoredModel:
     noise = stored.noise_floor or dict(zip(fit.joint_names, map(float, fit.noise), strict=True))
     return StoredModel(
         path, "fit", spec, folder, robot, fit.model, stored.held_out_run, stored.error, noise,
-        _processing(stored.processing), stored.traces, fit.best_model,
+        processing_of(stored.processing), stored.traces, fit.best_model,
         _information(fit.covariance), stored.sources,
     )  # fmt: skip
 
@@ -79,7 +78,7 @@ def _of_diagnosis(path: Path) -> StoredModel:
     trained = () if found.traces is None else found.traces.runs
     return StoredModel(
         path, "diagnosis", spec, folder, robot, _model(found.phi, records, robot, path),
-        found.held_out_run, found.after, noise, _processing(found.processing),
+        found.held_out_run, found.after, noise, processing_of(found.processing),
         (*trained, *found.held_out_traces), factor=_own_factor(found),
     )  # fmt: skip
 
@@ -159,7 +158,7 @@ def _of_numbers(
     phi = np.array([told.inertias[name] for name in names])
     return StoredModel(
         path, "config", spec, folder, robot, _model(phi, records, robot, path), told.held_out_run,
-        _errors(told), dict(told.noise), _processing(dict(told.processing)),
+        _errors(told), dict(told.noise), processing_of(dict(told.processing)),
     )  # fmt: skip
 
 
@@ -228,12 +227,3 @@ def _by_joint(values: Any, robot: Robot) -> dict[str, float] | None:
     if not isinstance(values, list) or len(values) != robot.n:
         return None
     return dict(zip(robot.joint_names, map(float, values), strict=True))
-
-
-def _processing(data: dict[str, Any]) -> Processing | None:
-    """The filters; None in files of earlier versions, which do not tell them all."""
-    names = [field.name for field in fields(Processing) if field.name != "reasons"]
-    if not all(name in data for name in names):
-        return None
-    stride = int(data["working_stride"])
-    return Processing(**{**{name: data[name] for name in names}, "working_stride": stride})

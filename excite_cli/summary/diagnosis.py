@@ -22,6 +22,7 @@ from excite_cli.diagnosis.words import (
 )
 from excite_cli.fields import data_of, public_data
 from excite_cli.report.residual_chart import dependence_plots, residuals_in_time
+from excite_cli.report.validity_chart import validity_section
 from excite_cli.shown.answer import (
     Answer,
     Block,
@@ -142,6 +143,12 @@ def _time_section(found: Diagnosis, detail: Detail) -> Section:
         "with all effects; below: residuals of this and of the declared model. Shaded: held out."
     )
     return Section("diagnosis-time", "Residual in time", blocks, lead)
+
+
+def _validity_section(found: Diagnosis, detail: Detail) -> Section:
+    runs = found.traces.runs if detail == Detail.PAGE and found.traces is not None else ()
+    traces = (*found.held_out_traces, *runs) if runs else ()
+    return validity_section(traces, found.processing, found.joint_names, found.torque_units)
 
 
 def _unexplained_section(found: Diagnosis, detail: Detail) -> Section:
@@ -326,6 +333,7 @@ SECTIONS: list[Callable[[Diagnosis, Detail], Section]] = [
     errors_section,
     _time_section,
     evidence_section,
+    _validity_section,
     _unexplained_section,
     _next_section,
     _candidates_section,

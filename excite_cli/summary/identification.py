@@ -23,6 +23,7 @@ from excite_cli.identification.link_changes import LinkChange
 from excite_cli.identification.stored_model import StoredFit
 from excite_cli.report.error_chart import NOTHING_MOVES, error_charts, parameter_charts
 from excite_cli.report.residual_chart import residuals_in_time
+from excite_cli.report.validity_chart import validity_section
 from excite_cli.shown.answer import (
     Answer,
     Block,
@@ -289,6 +290,7 @@ def fit_sections(stored: StoredFit) -> list[Section]:
             "Filtered torque, as used in the fit. Above: measured torque and prediction of the "
             "model; below: residual. Shaded: held out from the fit.",
         ),
+        *_validity(stored),
         Section(
             "fit-data",
             "Data and choices",
@@ -299,6 +301,12 @@ def fit_sections(stored: StoredFit) -> list[Section]:
             f"From {', '.join(stored.sources)}.",
         ),
     ]
+
+
+def _validity(stored: StoredFit) -> list[Section]:
+    names, units = stored.fit.joint_names, stored.torque_units
+    section = validity_section(stored.traces, stored.processing, names, units)
+    return [section] if section.blocks else []
 
 
 def _error_blocks(stored: StoredFit) -> list[Block]:

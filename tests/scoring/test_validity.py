@@ -84,15 +84,13 @@ def test_near_a_reversal_it_is_larger_the_longer_filters_smear_it() -> None:
         assert np.all(said(validity, v=slow, a=20.0) > 1.5 * said(validity, v=slow, a=0.0))
 
 
-def test_what_held_out_data_left_more_is_expected_everywhere(loop: Loop) -> None:
-    made = Model.load(loop.fit).made
-    training, other = (replace(trace(0.2), held_out=held) for held in (False, True))
-    other = replace(other, measured=other.predicted + 2.0 * (other.measured - other.predicted))
-    alone = replace(made, traces=(training,), factor=None)
-    both = replace(made, traces=(training, other), factor=None)
-    once = validity_of(both.traces, both.processing).coefficients[:, 0]
-    assert Trust(both).validity.coefficients[:, 0] == pytest.approx(4.0 * once, rel=0.15)
-    assert Trust(alone).validity.coefficients[:, 0] == pytest.approx([0.04, 0.01], rel=0.15)
+def test_what_held_out_data_left_more_is_expected_everywhere() -> None:
+    training, other = trace(0.2), trace(0.2)
+    left = 2.0 * (other.measured - other.predicted)
+    other = replace(other, measured=other.predicted + left)
+    both, held = [training, other], [training, replace(other, held_out=True)]
+    once, more = (validity_of(each, None).coefficients[:, 0] for each in (both, held))
+    assert more == pytest.approx(4.0 * once, rel=0.15)
 
 
 def test_where_a_joint_stands_its_friction_is_anything() -> None:

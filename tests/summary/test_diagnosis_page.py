@@ -125,6 +125,7 @@ def test_all_parts_are_there_and_the_page_is_sound(
     structure = Structure(render(page))
     assert [each.anchor for each in page.sections] == [
         "diagnosis-found", "diagnosis-errors", "diagnosis-time", "diagnosis-evidence",
+        "validity",
         "diagnosis-unexplained", "diagnosis-next", "diagnosis-candidates", "diagnosis-data",
     ]  # fmt: skip
     for words in (
