@@ -33,6 +33,7 @@ from excite_cli.identification.uncertain_model import (
     uncertain,
 )
 from excite_cli.robot.model import Array, Robot
+from excite_cli.scoring.validity import Trust
 from excite_cli.shown.note import Level, Note, Tell
 from excite_cli.store.diagnosis_file import read_diagnosis
 from excite_cli.store.fit_file import read_fit
@@ -82,7 +83,8 @@ def write_requested(wanted: ModelRequest, tell: Tell) -> HeldOutErrors | None:
     if format == "c":
         names = robot.joint_names
         limits = None if wanted.thresholds is None else read_thresholds(wanted.thresholds, names)
-        write_exported(c_model(robot, stored.model, "", limits), path, tell)
+        trust = Trust(stored) if stored.traces else None
+        write_exported(c_model(robot, stored.model, "", limits, trust), path, tell)
     elif format in OF_DRIVES:
         write_exported(_actuators(stored, format, path, tell), path, tell)
     elif format == "randomization":

@@ -118,7 +118,8 @@ class Trust:
             )
         self._robot, self._model = stored.robot, stored.model
         self.validity = validity_of(stored.traces)
-        self._root = self._root_of(stored)
+        # B (P + k, m) of the covariance B Bᵀ of φ and the effects; None where it is not known.
+        self.root = self._root_of(stored)
 
     def deviation(self, series: Series, load: Array) -> Array:
         """s (T, n) [N·m] (N) of the torque, beside the model's `load` (T, n)."""
@@ -126,7 +127,7 @@ class Trust:
 
     def by_parameters(self, series: Series) -> Array:
         """d (T, n) [N·m] (N): of the torque by the covariance of the parameters; 0 if unknown."""
-        if self._root is None:
+        if self.root is None:
             return np.zeros_like(series.q)
         robot, model = self._robot, self._model
         effects = self._effects(series)
@@ -135,7 +136,7 @@ class Trust:
             part = slice(start, start + _AT_ONCE)
             body = RigidBody(robot, model.phi, series.q[part], series.v[part], series.a[part])
             columns = np.concatenate([body.regressor, effects[part]], axis=2)
-            found[part] = np.sqrt(np.square(columns @ self._root).sum(axis=2))
+            found[part] = np.sqrt(np.square(columns @ self.root).sum(axis=2))
         return found
 
     def _effects(self, series: Series) -> Array:

@@ -1,0 +1,158 @@
+/* The standard deviation s of a measured torque about that of excite_state, in a state by itself:
+ *
+ *     s^2 = (c0 + c1 v^2 + c2 load^2 + c3 exp(-(v/w)^2)) max(1, |v|/v99, |load|/load99)^2 + d^2
+ *
+ * with c, w, v99, load99 of the residuals on the model's own data, and d^2 = |R x|^2 by the
+ * covariance R'R of its parameters, x their columns@ZERO@. */
+#define EXCITE_STD
+
+/* c0 to c3, w, v99, load99; c0 below 0: too few samples. */
+static const real OWN[N][7] = {
+@OWN@
+};
+
+#define UNSURE @UNSURE@ /* parameters with a covariance */
+#define INERTIAL @INERTIAL@ /* the first of them are inertial */
+#if UNSURE
+static const int SELECTED[INERTIAL + 1] = {@SELECTED@};
+static const real ROOT[UNSURE * (UNSURE + 1) / 2] = {@ROOT@}; /* R, by rows from the diagonal on */
+
+/* Columns of the ten parameters of every body: the power of its wrench while one joint alone moves,
+ * with unit speed, which turns the body by `turn` and moves its origin by `way`. */
+static void inertial_columns(const real *q, const real *v, const real *a, real x[10 * M][N])
+{
+    motion at;
+    real all[3][M];
+    spread(q, v, a, all);
+    move(GRAVITY, all[0], all[1], all[2], &at);
+    memset(x, 0, 10 * M * sizeof(*x));
+    for (int j = 0; j < M; ++j) {
+        real turn[M][3], way[M][3];
+        int moved[M] = {0};
+        for (int k = j; k < M; ++k) {
+            const int parent = JOINT[k].parent;
+            const real *w = at.w[k], *dw = at.dw[k], *acc = at.acc[k];
+            real *o = turn[k], *l = way[k], y[3], z[3], h[3];
+            moved[k] = k == j || (parent >= j && moved[parent]);
+            if (!moved[k])
+                continue;
+            if (k == j) {
+                memset(o, 0, sizeof(turn[k]));
+                memset(l, 0, sizeof(way[k]));
+                memcpy(JOINT[j].slides ? l : o, JOINT[j].axis, sizeof(turn[k]));
+            } else {
+                cross(turn[parent], at.p[k], y);
+                for (int i = 0; i < 3; ++i)
+                    y[i] += way[parent][i];
+                into(at.r[k], y, l);
+                into(at.r[k], turn[parent], o);
+            }
+            cross(l, w, y);
+            cross(y, w, h);
+            cross(l, dw, y);
+            cross(acc, o, z);
+            for (int i = 0; i < 3; ++i)
+                h[i] += y[i] + z[i];
+            cross(o, w, y);
+            const real ten[10] = {
+                l[0] * acc[0] + l[1] * acc[1] + l[2] * acc[2], h[0], h[1], h[2],
+                o[0] * dw[0] + y[0] * w[0], o[0] * dw[1] + o[1] * dw[0] + y[0] * w[1] + y[1] * w[0],
+                o[1] * dw[1] + y[1] * w[1], o[0] * dw[2] + o[2] * dw[0] + y[0] * w[2] + y[2] * w[0],
+                o[1] * dw[2] + o[2] * dw[1] + y[1] * w[2] + y[2] * w[1], o[2] * dw[2] + y[2] * w[2],
+            };
+            for (int i = 0; i < 10; ++i)
+                x[10 * k + i][JOINT[j].driver] += JOINT[j].multiplier * ten[i];
+        }
+    }
+}
+
+/* What one unit of each parameter of the effects adds to the torque. */
+static void effect_columns(const real *q, const real *v, const real *a, real x[UNSURE][N])
+{
+    const real t = 0, start = 0, *column = 0, *torque_rate = STILL;
+    const real *load_rate = STILL, *load_bend = STILL;
+    excite_memory fresh, *memory = &fresh;
+    real s[N], load[N], torque[N];
+    excite_begin(memory, 1, 0);
+    next(memory, q, v);
+    for (int j = 0; j < N; ++j)
+        s[j] = SIGN(v[j]);
+    rigid(LOADED, GRAVITY, q, v, a, load);
+    if (@WHOLE@)
+        robot_torque(memory, q, v, a, column, load, load_rate, load_bend, torque);
+    memset(x, 0, UNSURE * sizeof(*x));
+    (void)t, (void)start, (void)column, (void)torque_rate, (void)load_rate, (void)load_bend;
+    (void)s, (void)torque;
+@EFFECT_COLUMNS@
+}
+
+static void add_parameters(const real *q, const real *v, const real *a, real square[N])
+{
+    real x[UNSURE][N], ten[10 * M][N];
+    const real *root = ROOT;
+    effect_columns(q, v, a, x);
+    inertial_columns(q, v, a, ten);
+    for (int i = 0; i < INERTIAL; ++i)
+        memcpy(x[i], ten[SELECTED[i]], sizeof(*x));
+    for (int i = 0; i < UNSURE; ++i) {
+        real sum[N] = {0};
+        for (int k = i; k < UNSURE; ++k, ++root)
+            for (int j = 0; j < N; ++j)
+                sum[j] += *root * x[k][j];
+        for (int j = 0; j < N; ++j)
+            square[j] += sum[j] * sum[j];
+    }
+}
+#endif
+
+/* 1 where some s is not known, which is NaN: of joints with too few samples, and of all where
+ * something given is not finite. */
+int excite_std(const real q[N], const real v[N], const real a[N], real s[N])
+{
+    int unknown = !given(q, v, a, 0);
+    real load[N];
+    spoil(N, s, 0);
+    if (unknown)
+        return 1;
+    rigid(BODY, GRAVITY, q, v, a, load);
+    for (int j = 0; j < N; ++j) {
+        const real *c = OWN[j], slow = v[j] / c[4];
+        const real beyond = fmax(1, fmax(fabs(v[j]) / c[5], fabs(load[j]) / c[6]));
+        s[j] = beyond * beyond
+            * (c[0] + c[1] * v[j] * v[j] + c[2] * load[j] * load[j] + c[3] * exp(-slow * slow));
+    }
+#if UNSURE
+    add_parameters(q, v, a, s);
+#endif
+    for (int j = 0; j < N; ++j) {
+        s[j] = sqrt(s[j]);
+        if (OWN[j][0] < 0 || !all_finite(1, s + j)) {
+            spoil(1, s + j, 0);
+            unknown = 1;
+        }
+    }
+    return unknown;
+}
+
+static const real TEST_STD[TESTED * N] = {@TEST_STD@}; /* 0 where it is not known */
+
+/* Largest deviation from recorded s, relative to the largest of them; 1 if one is given for a state
+ * that is not finite. */
+real excite_std_self_test(void)
+{
+    real found[TESTED * N], x[3 * N], s[N];
+    for (size_t k = 0; k < TESTED; ++k) {
+        excite_std(TEST_Q + k * N, TEST_V + k * N, TEST_A + k * N, found + k * N);
+        for (int j = 0; j < N; ++j)
+            if (OWN[j][0] < 0 && !all_finite(1, found + k * N + j))
+                found[k * N + j] = 0;
+    }
+    for (int k = 0; k < 6 * N; ++k) {
+        memset(x, 0, sizeof(x));
+        spoil(1, x + k / 2, k % 2);
+        if (!excite_std(x, x + N, x + 2 * N, s) || all_finite(1, s))
+            return 1;
+    }
+    return deviation(TESTED * N, found, TEST_STD);
+}
+
