@@ -1,11 +1,11 @@
 """The standard deviation of the predicted torque, `excite_std` of a model's C file.
 
 As `Validity.deviation` has it, s² = (c₀ + c₁ v² + c₂ load² + c₃ exp(−(v/w)²)) g² + d². With columns
-Y = Y_B G of the inertias (G maps φ to the r base parameters) and E of the k effects, d = |[Y E] B| is
+Y = Y_B G of the inertias (G maps φ to r base parameters) and E of the k effects, d = |[Y E] B| is
 
     d² = |R x|²,    x = [Y_B E],    RᵀR = A Aᵀ,    A = [G B_φ; B_θ],
 
-R upper triangular (r + k, r + k): with fewer numbers than B, and as fast.
+R upper triangular (r + k, r + k).
 """
 
 from importlib.resources import files
@@ -41,7 +41,7 @@ def std_in_c(robot: Robot, model: IdentifiedModel, trust: Trust, states: Array) 
         "UNSURE": str(len(root)),
         "INERTIAL": str(len(selected)),
         "SELECTED": ", ".join(map(str, [*selected, 0])),
-        "ROOT": wrapped(root[np.triu_indices(len(root))]),
+        "ROOT": wrapped(root.T[np.tril_indices(len(root))]),
         "WHOLE": str(int(any(effect.data_defect for effect in model.effects))),
         "EFFECT_COLUMNS": "\n".join(
             f"    {{ real *tau = x[{len(selected) + k}]; {code} }}" for k, code in enumerate(codes)
@@ -65,7 +65,8 @@ def _parameters(
         selection, mapped = np.arange(count), trust.root[:count]
     else:
         selection, mapped = base.selection, base.mapping @ trust.root[:count]
-    columns, rows, codes, others = [selection], [mapped], [], []
+    # Of the last bodies first: they show in most joints, and the first columns of R are short.
+    columns, rows, codes, others = [selection[::-1]], [mapped[::-1]], [], []
     places = places_of(model.effects, len(trust.root))
     for effect, place in zip(model.effects, places, strict=True):
         own = trust.root[place]

@@ -15,7 +15,7 @@ static const real OWN[N][7] = {
 #define INERTIAL @INERTIAL@ /* the first of them are inertial */
 #if UNSURE
 static const int SELECTED[INERTIAL + 1] = {@SELECTED@};
-static const real ROOT[UNSURE * (UNSURE + 1) / 2] = {@ROOT@}; /* R, by rows from the diagonal on */
+static const real ROOT[UNSURE * (UNSURE + 1) / 2] = {@ROOT@}; /* R, by columns down to the diagonal */
 
 /* Columns of the ten parameters of every body: the power of its wrench while one joint alone moves,
  * with unit speed, which turns the body by `turn` and moves its origin by `way`. */
@@ -89,18 +89,19 @@ static void effect_columns(const real *q, const real *v, const real *a, real x[U
 static void add_parameters(const real *q, const real *v, const real *a, real square[N])
 {
     real x[UNSURE][N], ten[10 * M][N];
-    const real *root = ROOT;
     effect_columns(q, v, a, x);
     inertial_columns(q, v, a, ten);
     for (int i = 0; i < INERTIAL; ++i)
         memcpy(x[i], ten[SELECTED[i]], sizeof(*x));
-    for (int i = 0; i < UNSURE; ++i) {
-        real sum[N] = {0};
-        for (int k = i; k < UNSURE; ++k, ++root)
-            for (int j = 0; j < N; ++j)
-                sum[j] += *root * x[k][j];
-        for (int j = 0; j < N; ++j)
-            square[j] += sum[j] * sum[j];
+    for (int j = 0; j < N; ++j) {
+        const real *column = ROOT;
+        real y[UNSURE] = {0};
+        for (int k = 0; k < UNSURE; column += ++k)
+            if (x[k][j] != 0)
+                for (int i = 0; i <= k; ++i)
+                    y[i] += x[k][j] * column[i];
+        for (int i = 0; i < UNSURE; ++i)
+            square[j] += y[i] * y[i];
     }
 }
 #endif
