@@ -5,6 +5,7 @@ import re
 import subprocess
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +72,14 @@ def assert_std(made: StoredModel, folder: Path) -> None:
     assert library.excite_std_self_test() < 1e-9
 
 
+@pytest.fixture(scope="module")
+def fast(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+    """Compiled without regard for what is not finite."""
+    made = stored(*of_ur10(["load_dependent_friction", "spring"]))
+    text = c_model(made.robot, made.model, trust=Trust(made)).text
+    return compiled(text, tmp_path_factory.mktemp("c"), COMPILERS[0], "-ffast-math", level="-O3")
+
+
 def test_all_effects_at_once(tmp_path: Path) -> None:
     assert_std(stored(*of_ur10(KINDS)), tmp_path)
 
@@ -106,6 +115,15 @@ def test_of_an_unknown_joint_it_is_nan_and_says_so(tmp_path: Path) -> None:
     assert np.isnan(found).tolist() == [[j == 2 for j in range(6)]] * 5
     library.excite_std_self_test.restype = ctypes.c_double
     assert library.excite_std_self_test() < 1e-9
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e308])
+def test_what_is_not_finite_has_none(bad: float, fast: ctypes.CDLL) -> None:
+    for name, k in product(("excite_std", "excite_state", "excite_friction"), range(18)):
+        x = np.ones((3, 1, 6))
+        x.reshape(-1)[k] = bad
+        assert np.isnan(by_c(fast, name, *x, back=1)).all()
+        assert np.isfinite(by_c(fast, name, *np.ones((3, 1, 6)))).all()
 
 
 def test_without_a_covariance_it_is_of_the_residual_alone(tmp_path: Path) -> None:
