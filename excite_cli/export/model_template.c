@@ -513,16 +513,35 @@ static void measured_torque(
 @DEFECTS@
 }
 
+static int given(const real *q, const real *v, const real *a, const real *column)
+{
+    return all_finite(N, q) && all_finite(N, v) && all_finite(N, a)
+        && (!column || all_finite(EXCITE_COLUMNS, column));
+}
+
+static int answer(size_t count, int sound, real *x) /* 1 and NaN, unless all is finite */
+{
+    sound = sound && all_finite(count, x);
+    if (!sound)
+        spoil(count, x, 0);
+    return !sound;
+}
+
 int excite_load(const real q[N], const real v[N], const real a[N], real tau[N])
 {
-    int sound = all_finite(N, q) && all_finite(N, v) && all_finite(N, a);
-    if (sound) {
-        rigid(LOADED, GRAVITY, q, v, a, tau);
-        sound = all_finite(N, tau);
-    }
-    if (!sound)
-        spoil(N, tau, 0);
-    return !sound;
+    rigid(LOADED, GRAVITY, q, v, a, tau);
+    return answer(N, given(q, v, a, 0), tau);
+}
+
+/* `load`: torque that the gears carry. */
+int excite_friction(const real q[N], const real v[N], const real load[N], real tau[N])
+{
+    real s[N];
+    for (int j = 0; j < N; ++j)
+        s[j] = SIGN(v[j]);
+    memset(tau, 0, N * sizeof(real));
+    add_friction(0, s, q, v, load, tau);
+    return answer(N, given(q, v, load, 0), tau);
 }
 
 /* `step` between the instants [s]; `start` on the campaign's clock [s]. */
@@ -578,12 +597,6 @@ static inline void backward(
     }
 }
 
-static int given(const real *q, const real *v, const real *a, const real *column)
-{
-    return all_finite(N, q) && all_finite(N, v) && all_finite(N, a)
-        && (!column || all_finite(EXCITE_COLUMNS, column));
-}
-
 int excite_torque(
     excite_memory *memory, const real q[N], const real v[N], const real a[N],
     const real column[], real tau[N])
@@ -592,8 +605,7 @@ int excite_torque(
     excite_memory ahead = *memory;
     if (!memory->usable || !given(q, v, a, column)) {
         memory->count += 1;
-        spoil(N, tau, 0);
-        return 1;
+        return answer(N, 0, tau);
     }
     next(&ahead, q, v);
     rigid(LOADED, GRAVITY, q, v, a, load);
@@ -603,10 +615,8 @@ int excite_torque(
     if (RATES)
         backward(&ahead, torque, ahead.torque, rate, bend);
     measured_torque(q, v, column, load, torque, rate, tau);
-    if (kept(memory, &ahead, all_finite(N, load) && all_finite(N, torque) && all_finite(N, tau)))
-        return 0;
-    spoil(N, tau, 0);
-    return 1;
+    const int sound = all_finite(N, load) && all_finite(N, torque) && all_finite(N, tau);
+    return answer(N, kept(memory, &ahead, sound), tau);
 }
 
 int excite_state(const real q[N], const real v[N], const real a[N]@COLUMN@, real tau[N])
@@ -614,20 +624,6 @@ int excite_state(const real q[N], const real v[N], const real a[N]@COLUMN@, real
     excite_memory memory;
     excite_begin(&memory, 1, 0);
     return excite_torque(&memory, q, v, a, @COLUMN_GIVEN@, tau);
-}
-
-int excite_friction(const real q[N], const real v[N], const real load[N], real tau[N])
-{
-    real s[N];
-    int sound = given(q, v, load, 0);
-    for (int j = 0; j < N; ++j)
-        s[j] = SIGN(v[j]);
-    memset(tau, 0, N * sizeof(real));
-    add_friction(0, s, q, v, load, tau);
-    sound = sound && all_finite(N, tau);
-    if (!sound)
-        spoil(N, tau, 0);
-    return !sound;
 }
 
 /* Central differences of rows; one-sided at the ends. */

@@ -66,13 +66,13 @@ static void inertial_columns(const real *q, const real *v, const real *a, real x
     }
 }
 
-/* What one unit of each parameter of the effects adds to the torque. */
-static void effect_columns(const real *q, const real *v, const real *a, real x[UNSURE][N])
+/* Adds d^2. Effects add to the torque what one unit of each of their parameters does. */
+static void add_parameters(const real *q, const real *v, const real *a, real square[N])
 {
     const real t = 0, start = 0, *column = 0, *torque_rate = STILL;
     const real *load_rate = STILL, *load_bend = STILL;
+    real x[UNSURE][N] = {{0}}, ten[10 * M][N], s[N], load[N], torque[N];
     excite_memory fresh, *memory = &fresh;
-    real s[N], load[N], torque[N];
     excite_begin(memory, 1, 0);
     next(memory, q, v);
     for (int j = 0; j < N; ++j)
@@ -80,26 +80,19 @@ static void effect_columns(const real *q, const real *v, const real *a, real x[U
     rigid(LOADED, GRAVITY, q, v, a, load);
     if (@WHOLE@)
         robot_torque(memory, q, v, a, column, load, load_rate, load_bend, torque);
-    memset(x, 0, UNSURE * sizeof(*x));
     (void)t, (void)start, (void)column, (void)torque_rate, (void)load_rate, (void)load_bend;
     (void)s, (void)torque;
 @EFFECT_COLUMNS@
-}
-
-static void add_parameters(const real *q, const real *v, const real *a, real square[N])
-{
-    real x[UNSURE][N], ten[10 * M][N];
-    effect_columns(q, v, a, x);
     inertial_columns(q, v, a, ten);
     for (int i = 0; i < INERTIAL; ++i)
         memcpy(x[i], ten[SELECTED[i]], sizeof(*x));
     for (int j = 0; j < N; ++j) {
-        const real *column = ROOT;
+        const real *own = ROOT;
         real y[UNSURE] = {0};
-        for (int k = 0; k < UNSURE; column += ++k)
+        for (int k = 0; k < UNSURE; own += ++k)
             if (x[k][j] != 0)
                 for (int i = 0; i <= k; ++i)
-                    y[i] += x[k][j] * column[i];
+                    y[i] += x[k][j] * own[i];
         for (int i = 0; i < UNSURE; ++i)
             square[j] += y[i] * y[i];
     }
@@ -110,11 +103,9 @@ static void add_parameters(const real *q, const real *v, const real *a, real squ
  * something given is not finite. */
 int excite_std(const real q[N], const real v[N], const real a[N], real s[N])
 {
-    int unknown = !given(q, v, a, 0);
+    const int sound = given(q, v, a, 0);
+    int unknown = 0;
     real load[N];
-    spoil(N, s, 0);
-    if (unknown)
-        return 1;
     rigid(BODY, GRAVITY, q, v, a, load);
     for (int j = 0; j < N; ++j) {
         const real *c = OWN[j], slow = v[j] / c[4];
@@ -127,10 +118,7 @@ int excite_std(const real q[N], const real v[N], const real a[N], real s[N])
 #endif
     for (int j = 0; j < N; ++j) {
         s[j] = sqrt(s[j]);
-        if (OWN[j][0] < 0 || !all_finite(1, s + j)) {
-            spoil(1, s + j, 0);
-            unknown = 1;
-        }
+        unknown |= answer(1, sound && OWN[j][0] >= 0, s + j);
     }
     return unknown;
 }

@@ -33,40 +33,31 @@ class Solver : public inverse_dynamics_solver::InverseDynamicsSolver
 public:
   void initialize(
     rclcpp::node_interfaces::NodeParametersInterface::ConstSharedPtr, const std::string &,
-    const std::string &) override
-  {
-  }
+    const std::string &) override {}
 
   MatrixXd getInertiaMatrix(const VectorXd & q) const override
   {
-    const VectorXd gravity = getGravityVector(q);
     MatrixXd inertia(N, N);
     for (int j = 0; j < N; ++j) {
-      VectorXd unit = VectorXd::Zero(N);
-      unit(j) = 1.0;
-      const VectorXd column = getTorques(q, VectorXd::Zero(N), unit);
-      for (int i = 0; i < N; ++i) {
-        inertia(i, j) = column(i) - gravity(i);
-      }
+      inertia.col(j) = getTorques(q, zero_, VectorXd::Unit(N, j)) - getGravityVector(q);
     }
     return inertia;
   }
 
   VectorXd getCoriolisVector(const VectorXd & q, const VectorXd & v) const override
   {
-    return getTorques(q, v, VectorXd::Zero(N)) - getGravityVector(q) - getFrictionVector(v);
+    return getTorques(q, v, zero_) - getGravityVector(q) - getFrictionVector(v);
   }
 
   VectorXd getGravityVector(const VectorXd & q) const override
   {
-    return getTorques(q, VectorXd::Zero(N), VectorXd::Zero(N));
+    return getTorques(q, zero_, zero_);
   }
 
   VectorXd getFrictionVector(const VectorXd & v) const override
   {
-    const VectorXd zero = VectorXd::Zero(N);
     VectorXd tau(N);
-    excite_friction(zero.data(), checked(v), zero.data(), tau.data());
+    excite_friction(zero_.data(), checked(v), zero_.data(), tau.data());
     return tau;
   }
 
@@ -78,13 +69,15 @@ public:
   }
 
 private:
+  const VectorXd zero_ = VectorXd::Zero(N);
+
   static const double * checked(const VectorXd & x)
   {
-    if (x.size() != N) {
-      throw std::invalid_argument(
-        "@NAME@: " + std::to_string(x.size()) + " joints are given. Give @N@, in this order: @JOINTS@.");
+    if (x.size() == N) {
+      return x.data();
     }
-    return x.data();
+    throw std::invalid_argument(
+      "@NAME@: " + std::to_string(x.size()) + " joints are given. Give @N@, in this order: @JOINTS@.");
   }
 };
 }  // namespace @NAME@_plugin
