@@ -61,10 +61,11 @@ def _parameters(
     if trust.root is None:
         return np.zeros(0, dtype=np.intp), [], np.zeros((0, 0))
     base, count = find_base_parameters(robot), len(model.phi)
-    if base.tilted:  # their X is that of right angles
+    selection, mapped = base.selection, base.mapping @ trust.root[:count]
+    if base.tilted:  # their G is that of right angles
         selection, mapped = np.arange(count), trust.root[:count]
-    else:
-        selection, mapped = base.selection, base.mapping @ trust.root[:count]
+    before = 10 * tree_of(robot).first_body  # of the base, which stands still
+    selection, mapped = selection[selection >= before], mapped[selection >= before]
     # Of the last bodies first: they show in most joints, and the first columns of R are short.
     columns, rows, codes, others = [selection[::-1]], [mapped[::-1]], [], []
     places = places_of(model.effects, len(trust.root))
@@ -81,7 +82,7 @@ def _parameters(
         codes += found if all(found) else []
         others += [own] if all(found) else []
     root = triangle_of(np.vstack([*rows, *others]).T)
-    return np.concatenate(columns) - 10 * tree_of(robot).first_body, codes, root
+    return np.concatenate(columns) - before, codes, root
 
 
 def _tested(robot: Robot, model: IdentifiedModel, trust: Trust, states: Array) -> Array:

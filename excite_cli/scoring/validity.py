@@ -43,6 +43,7 @@ from excite_cli.robot.model import Array
 from excite_cli.scoring.thresholds import speed_and_load_squares, squares_of
 
 _REVERSAL = 0.05  # of a joint's RMS speed: below it friction is known least
+_STANDS = 1e-9  # rad/s: no joint that moves is slower
 _RANGE = 0.99  # quantile of the own data: beyond it a state is outside
 # Share of the mean square. Of 14 simulated robots as they are, four motions each that took no part:
 # with none 1.96 s hold 87 to 89 % of the samples (means over the robots, by kind of motion), with
@@ -99,7 +100,7 @@ def _of_joint(v: Array, load: Array, left: Array) -> tuple[Array, float, float, 
     if known.sum() < FEWEST:
         return np.full(4, nan), nan, nan, nan
     v, load, squares = v[known], load[known], np.square(left[known])
-    width = _REVERSAL * float(np.sqrt(np.mean(np.square(v))))
+    width = max(_REVERSAL * float(np.sqrt(np.mean(np.square(v)))), _STANDS)
     coefficients = (1.0 - _MEAN) * speed_and_load_squares(squares, v, load, width)
     coefficients[0] += _MEAN * squares.mean()
     fastest, heaviest = (float(np.quantile(np.abs(x), _RANGE)) for x in (v, load))

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from excite_cli.api.model import Model
+from excite_cli.config.load_spec import load_spec
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.regressor import standard_parameters
@@ -22,8 +23,9 @@ from excite_cli.export.c_model import c_model
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.stored_model import StoredModel
 from excite_cli.identification.torque_trace import TorqueTrace
-from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.model import Array, Robot, build_robot
 from excite_cli.scoring.validity import Trust
+from tests.cli.program import ROOT
 from tests.export.test_c_model import COMPILERS, STRICT, compiled, of_ur10
 from tests.robot.coupled_robots import HAND, coupled_robot
 from tests.robot.random_robots import random_robot
@@ -95,6 +97,13 @@ def test_random_trees_with_sliding_joints(seed: int, tmp_path: Path) -> None:
 def test_joints_that_others_follow(tmp_path: Path) -> None:
     robot = coupled_robot(HAND)
     assert_std(stored(robot, IdentifiedModel(standard_parameters(robot))), tmp_path)
+
+
+def test_a_base_that_stands_still_adds_nothing(tmp_path: Path) -> None:
+    robot = build_robot(load_spec(ROOT / "configs" / "talos_base.yaml").robot)
+    payload = kind_named("payload")((robot.n - 1,))
+    model = IdentifiedModel(standard_parameters(robot), (payload,), np.ones(10))
+    assert_std(stored(robot, model), tmp_path)
 
 
 def test_a_payload_of_single_recordings_adds_nothing(tmp_path: Path) -> None:

@@ -65,6 +65,13 @@ def test_outside_of_the_data_it_grows_with_the_distance_and_by_parameters_everyw
     assert away == pytest.approx(np.array([[0.0, 2.0]]), abs=0.05)
 
 
+def test_of_a_joint_that_only_stood_nothing_is_known_of_its_motion() -> None:
+    made = trace(0.2)
+    made = replace(made, v=np.where([True, False], 0.0, made.v))
+    assert deviation([made], 0.0, 5.0) == pytest.approx([0.2, 0.1], rel=0.1)
+    assert np.isinf(deviation([made], 0.1, 5.0)).tolist() == [True, False]
+
+
 def test_of_joints_without_samples_nothing_is_known() -> None:
     made = trace(0.2)
     made = replace(made, measured=np.where([False, True], made.measured, np.nan))
