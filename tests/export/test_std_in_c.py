@@ -9,6 +9,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from excite_cli.api.model import Model
@@ -103,6 +104,17 @@ def test_a_base_that_stands_still_adds_nothing(tmp_path: Path) -> None:
     robot = build_robot(load_spec(ROOT / "configs" / "talos_base.yaml").robot)
     payload = kind_named("payload")((robot.n - 1,))
     model = IdentifiedModel(standard_parameters(robot), (payload,), np.ones(10))
+    assert_std(stored(robot, model), tmp_path)
+
+
+def test_angles_that_are_right_but_for_their_decimals(tmp_path: Path) -> None:
+    robot, model = of_ur10(["spring", "payload"])
+    tilted = robot.model.copy()
+    place = tilted.jointPlacements[1]
+    turned = place.rotation @ pin.utils.rotate("x", 1e-3)
+    tilted.jointPlacements[1] = pin.SE3(turned, place.translation)
+    robot = replace(robot, model=tilted)
+    assert find_base_parameters(robot).tilted
     assert_std(stored(robot, model), tmp_path)
 
 
