@@ -1,6 +1,6 @@
 """Motions for controllers, identified models for simulators: `excite export`."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +20,7 @@ from excite_cli.claim import claim, leave
 from excite_cli.errors import ConfigError, FileError, nearest
 from excite_cli.export.exported import MODEL_FORMATS
 from excite_cli.export.held_out import HeldOutErrors
+from excite_cli.export.ros2_package import is_package
 from excite_cli.export.timed import timed_motion
 from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.motion_formats.base import MotionFormat
@@ -87,13 +88,13 @@ def export_file(
     overwrite: bool = False,
     tell: Tell = log_note,
 ) -> Exported:
-    """Write motions for controllers, or a model for simulators or in C: `excite export`.
+    """Write motions for controllers, or a model for simulators, in C or for ROS 2: `excite export`.
 
     `file` is a result, a motion in a controller's format, or a model (a fit, a diagnosis, a config
     with its numbers). Formats of motions are `csv`, `ros2`, `rosbag2`, `mcap`, `moveit`, `npz` and
-    those of packages, of models `urdf`, `mjcf`, `c`, `randomization`, of those whose
-    robot follows set points `isaaclab`, `mjlab`, `bam`, and of fits `yaml`. `output` is by default
-    named after `file`; several motions get their numbers before the suffix.
+    those of packages, of models `urdf`, `mjcf`, `c`, `ros2-package` (a folder), `randomization`, of
+    those whose robot follows set points `isaaclab`, `mjlab`, `bam`, and of fits `yaml`. `output` is
+    by default named after `file`; several motions get their numbers before the suffix.
 
     Motions (`chosen` of a result's by their index) are sampled at `rate` [Hz], exact at every
     instant [s, rad, rad/s, rad/s²; m for sliding joints]; `equidistant` stretches the step so that
@@ -142,7 +143,8 @@ def export_file(
         limits = None if thresholds is None else existing(thresholds)
         to = target or Path(f"{path.stem}{MODEL_FORMATS[format]}")
         wanted = ModelRequest(path, format, to, limits, samples, seed)
-        with held({"output": to}, overwrite, (path, *paths_in(limits))):
+        refuse_inputs_as_outputs({"--output": to}, (path, *paths_in(limits)))
+        with _held([to], is_package if format == "ros2-package" else None, overwrite):
             errors = write_requested(wanted, tell)
         return Exported(format, (to,), held_out=errors)
     if samples is not None or seed is not None:
@@ -152,7 +154,7 @@ def export_file(
     chains = chains_of(path, ChainRequest(chosen, periods, slow, start, allow_unproved, step), tell)
     paths = _paths(path, target, exporter, [each.name for each in chains])
     refuse_inputs_as_outputs({f"--output ({to})": to for to in paths}, (path,))
-    with _held(paths, exporter, overwrite):
+    with _held(paths, exporter.may_replace if exporter.folder else None, overwrite):
         motions = tuple(
             _written(each, to, exporter, rate, equidistant)
             for each, to in zip(chains, paths, strict=True)
@@ -253,9 +255,11 @@ def _paths(file: Path, output: Path | None, exporter: MotionFormat, names: list[
 
 
 @contextmanager
-def _held(paths: list[Path], exporter: MotionFormat, overwrite: bool) -> Iterator[None]:
-    """As `held`; a folder is replaced only by what is of its kind."""
-    if not exporter.folder:
+def _held(
+    paths: list[Path], may_replace: Callable[[Path], bool] | None, overwrite: bool
+) -> Iterator[None]:
+    """As `held`; of folders (with `may_replace`) only those of its kind are replaced."""
+    if may_replace is None:
         with held({f"output ({path})": path for path in paths}, overwrite):
             yield
         return
@@ -263,7 +267,7 @@ def _held(paths: list[Path], exporter: MotionFormat, overwrite: bool) -> Iterato
         for path in paths:
             claim(path)
             claims.callback(leave, path)
-            replaceable = exporter.may_replace(path)
+            replaceable = may_replace(path)
             if path.exists() and not (overwrite and replaceable):
                 replace = ", or replace it with --overwrite" if replaceable else ""
                 raise FileError(f"{path} exists already. Give another name{replace}.")

@@ -197,7 +197,7 @@ class Model(Shown):
         signals = Signals(series.t, series.q, series.v, series.a, carried, carried, body)
         total = np.zeros_like(series.q)
         for effect, values in model.by_effect:
-            if "speed" in effect.function_of and not (effect.over_time or effect.follows_covariate):
+            if effect.is_friction:
                 total += effect.torque(signals, values)
         return total[0] if single else total
 

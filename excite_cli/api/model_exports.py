@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from excite_cli.atomic import write_text_atomically
+from excite_cli.atomic import write_folder_atomically, write_text_atomically
 from excite_cli.config.load_spec import files_of_config
 from excite_cli.diagnosis.reduced_model import reduced_model
 from excite_cli.dynamics.base_parameters import find_base_parameters
@@ -22,6 +22,7 @@ from excite_cli.export.exported import OF_DRIVES, ModelText, in_words, with_stra
 from excite_cli.export.held_out import HeldOutErrors, held_out_errors, torque_left
 from excite_cli.export.parameters import parameters_yaml
 from excite_cli.export.randomization import quantities, randomization
+from excite_cli.export.ros2_package import ModelFolder, package_name, ros2_package
 from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.identification.fit import Fit, effect_parameters
 from excite_cli.identification.identified_model import IdentifiedModel, as_described
@@ -33,6 +34,7 @@ from excite_cli.identification.uncertain_model import (
     uncertain,
 )
 from excite_cli.robot.model import Array, Robot
+from excite_cli.scoring.validity import Trust
 from excite_cli.shown.note import Level, Note, Tell
 from excite_cli.store.diagnosis_file import read_diagnosis
 from excite_cli.store.fit_file import read_fit
@@ -79,10 +81,16 @@ def write_requested(wanted: ModelRequest, tell: Tell) -> HeldOutErrors | None:
     own = files_of_config(stored.spec, stored.folder, config)
     refuse_inputs_as_outputs({"--output": wanted.path}, (*own, *stored.sources))
     robot, format, path = stored.robot, wanted.format, wanted.path
-    if format == "c":
+    if format in ("c", "ros2-package"):
         names = robot.joint_names
         limits = None if wanted.thresholds is None else read_thresholds(wanted.thresholds, names)
-        write_exported(c_model(robot, stored.model, "", limits), path, tell)
+        trust = Trust(stored) if stored.traces else None
+        c_file = c_model(robot, stored.model, "", limits, trust)
+        if format == "c":
+            write_exported(c_file, path, tell)
+        else:
+            name = package_name(path.name)
+            write_exported(ros2_package(robot, stored.model, c_file, name), path, tell)
     elif format in OF_DRIVES:
         write_exported(_actuators(stored, format, path, tell), path, tell)
     elif format == "randomization":
@@ -265,8 +273,11 @@ def write_model(
         write_exported(mjcf.mjcf(robot, model, drive), path, tell)
 
 
-def write_exported(exported: ModelText, path: Path, tell: Tell) -> None:
-    """Write a model's text, and report what is not in it."""
-    write_text_atomically(path, exported.text)
+def write_exported(exported: ModelText | ModelFolder, path: Path, tell: Tell) -> None:
+    """Write a model's text, or the files of its folder, and report what is not in it."""
+    if isinstance(exported, ModelText):
+        write_text_atomically(path, exported.text)
+    else:
+        write_folder_atomically(path, exported.fill)
     for note in exported.notes:
         tell(Note(Level.NOTE, f"{path}: {note}"))

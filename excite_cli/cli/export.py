@@ -22,12 +22,12 @@ def export(
         "--format",
         "-f",
         metavar="FORMAT",
-        help="{motion_formats} of motions; urdf, mjcf, c, randomization of models; "
-        "isaaclab, mjlab, bam of those whose robot follows set points; yaml of fits.",
+        help="{motion_formats} of motions; urdf, mjcf, c, ros2-package, randomization of "
+        "models; isaaclab, mjlab, bam of those whose robot follows set points; yaml of fits.",
         autocompletion=complete_format,
     ),
     output: Path | None = options.written(
-        "--output", "-o", help="File, or folder of a bag. Default: named after FILE."
+        "--output", "-o", help="File, or folder of a bag or a package. Default: named after FILE."
     ),
     motion: str = typer.Option(
         "all", "--motion", metavar="I|all", help="Which motion of a result file."
@@ -92,8 +92,10 @@ def export(
     inertias are right: q + (torque + kd v) / kp, early by the delay of measurement.command.
 
     A model is a fit, a diagnosis or a config of `diagnose --apply`. As C it is one file without
-    dependencies or allocation, with all effects that C can hold and a self-test. For domain
-    randomization there are mean, covariance and samples of all numbers that simulators hold.
+    dependencies or allocation, with all effects that C can hold, the standard deviation of the
+    torque and a self-test. A ros2-package is a folder with this file and a plug-in of
+    inverse_dynamics_solver for ros2_control, named after the folder. For domain randomization there
+    are mean, covariance and samples of all numbers that simulators hold.
 
     Examples:
       excite export ur10.h5 --format csv --motion 1 -o motion.csv
@@ -101,6 +103,7 @@ def export(
       excite export ur10.h5 --format csv --motion 1 --slow 0.3 -o slow.csv
       excite export fit.h5 --format mjcf -o identified.xml
       excite export diagnosis.h5 --format c -o arm.c
+      excite export diagnosis.h5 --format ros2-package -o arm_dynamics
       excite export fit.h5 --format randomization --samples 100 --seed 1
     """
     from excite_cli.api.exporting import export_answer, export_file

@@ -132,6 +132,11 @@ class Effect(Judgement, Mechanism, Presentation, ABC):
         """Kind, joints, runs and column: effects that differ in shape only share it."""
         return Place(self.kind, self.joints, self.runs, self.covariate)
 
+    @property
+    def is_friction(self) -> bool:
+        """Whether it follows the speed of a state by itself: no series, and no column of a log."""
+        return "speed" in self.function_of and not (self.over_time or self.follows_covariate)
+
     def active(self, run: RunId) -> bool:
         """Whether the effect is present in `run`."""
         return not self.runs or run.is_among(self.runs)

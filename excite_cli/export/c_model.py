@@ -4,7 +4,7 @@ Every effect states its own C (`Effect.in_c`); the file is `model_template.c` wi
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable
 from importlib.resources import files
 
 import numpy as np
@@ -12,21 +12,15 @@ import numpy as np
 from excite_cli.effects.base import Effect
 from excite_cli.effects.mechanism import real, reals
 from excite_cli.effects.sign import WIDTH
+from excite_cli.export.c_text import braced, filled, wrapped
 from excite_cli.export.exported import ModelText, in_words
+from excite_cli.export.std_in_c import TEST_COLUMN, std_in_c
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.regression import Series
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.tree import Tree, tree_of
 from excite_cli.scoring.thresholds import REVERSAL, Residual, Thresholds
-
-# Filling the gaps of a template, `@NAME@`.
-
-
-def filled(text: str, gaps: Mapping[str, str]) -> str:
-    """The text with its gaps filled, in one pass: what is put in may look like a gap."""
-    places = "|".join(re.escape(name) for name in gaps)
-    return re.sub(f"@({places})@", lambda found: gaps[found[1]], text)
-
+from excite_cli.scoring.validity import Trust
 
 # The collision detector of a model's C file: thresholds, their low pass, and a test of both.
 
@@ -37,12 +31,11 @@ def detector_in_c(thresholds: Thresholds, count: int, step: float) -> str:
     rows = np.column_stack([thresholds.coefficients, thresholds.level])
     gaps = {
         "FALSE_ALARMS": f"{thresholds.false_alarms:g}",
-        "SOUND": ",\n".join(f"    {{{reals(row)}}}" for row in rows),
+        "SOUND": braced(rows),
         "TIME_CONSTANT": real(thresholds.time_constant),
         "REVERSAL": real(REVERSAL),
         "TEST_STEP": repr(step),
-        "DETECTED": "\n    "
-        + ",\n    ".join(map(reals, _detector_in_c_tested(thresholds, count, step))),
+        "DETECTED": wrapped(_detector_in_c_tested(thresholds, count, step)),
     }
     return filled(text, gaps)
 
@@ -72,6 +65,9 @@ def in_comment(words: str) -> str:
 
 
 _TESTED, _STEP, _SEED = 24, 0.01, 20170529
+_NO_STD = ":\n *                  not in this file, as {}"
+_UNHEARD = "the model does not say what it left of its own data"
+_UNKNOWN = "C has no code for some effect"
 
 
 def c_model(
@@ -79,10 +75,12 @@ def c_model(
     model: IdentifiedModel,
     made: str = "",
     thresholds: Thresholds | None = None,
+    trust: Trust | None = None,
 ) -> ModelText:
     """The C file, and what it leaves out; `made`: where the model comes from, in a few words.
 
-    With `thresholds` a collision detector is in it.
+    With `thresholds` a collision detector is in it; with `trust`, which `model` has of its own
+    data, the standard deviation of the torque, unless C has no code for some effect.
     """
     kept = model.without(model.of_single_runs)
     columns = tuple(dict.fromkeys(each.covariate for each in kept.effects if each.covariate))
@@ -98,6 +96,7 @@ def c_model(
     left = [*model.of_single_runs, *unknown]
     text = (files("excite_cli.export") / "model_template.c").read_text(encoding="utf-8")
     tree = tree_of(robot)
+    tested = _tested_series(robot, columns)
     gaps = {
         "ROBOT": in_comment(robot.name),
         "MADE": in_comment(made),
@@ -114,11 +113,17 @@ def c_model(
         "BODIES": _bodies(kept.phi, tree),
         "LOADED": _bodies(kept.phi + kept.carried(robot), tree),
         "DETECTOR": "" if thresholds is None else detector_in_c(thresholds, _TESTED, _STEP),
+        "COLUMN": ", const real column[EXCITE_COLUMNS]" if columns else "",
+        "COLUMN_GIVEN": "column" if columns else "0",
         "GRAVITY": reals(tree.gravity),
-        "ROBOT_EFFECTS": _code(codes, defects=False),
-        "DEFECTS": _code(codes, defects=True),
+        "FRICTION": _code(codes, lambda effect: effect.is_friction),
+        "ROBOT_EFFECTS": _code(codes, lambda e: not (e.data_defect or e.is_friction)),
+        "DEFECTS": _code(codes, lambda effect: effect.data_defect),
         "SERIES_EFFECTS": "\n".join(f"    {code}" for code in series if code),
-        **_tested(robot, kept, columns),
+        **_tested(robot, kept, tested),
+        "STD_COLUMN": TEST_COLUMN if columns else "",
+        "STD": "" if trust is None or unknown else std_in_c(robot, model, kept, trust, tested),
+        "NO_STD": "" if trust and not unknown else _NO_STD.format(_UNKNOWN if trust else _UNHEARD),
     }
     notes = []
     if model.of_single_runs:
@@ -131,8 +136,8 @@ def c_model(
     return ModelText(filled(text, gaps), tuple(notes))
 
 
-def _code(codes: list[tuple[Effect, str]], defects: bool) -> str:
-    kept = (code for effect, code in codes if effect.data_defect == defects and code)
+def _code(codes: list[tuple[Effect, str]], chosen: Callable[[Effect], bool]) -> str:
+    kept = (code for effect, code in codes if chosen(effect) and code)
     return "\n".join(f"    {code}" for code in kept)
 
 
@@ -147,12 +152,11 @@ def _tree(tree: Tree) -> str:
 
 
 def _bodies(phi: Array, tree: Tree) -> str:
-    bodies = phi.reshape(-1, 10)[tree.first_body :]
-    return ",\n".join(f"    {{{reals(ten)}}}" for ten in bodies)
+    return braced(phi.reshape(-1, 10)[tree.first_body :])
 
 
-def _tested(robot: Robot, model: IdentifiedModel, columns: tuple[str, ...]) -> dict[str, str]:
-    """A series with reversals, and its torques."""
+def _tested_series(robot: Robot, columns: tuple[str, ...]) -> Series:
+    """A series with reversals."""
     rng = np.random.default_rng(_SEED)
     t: Array = np.asarray(_STEP * np.arange(_TESTED))
     rates, phases = rng.uniform(5.0, 25.0, robot.n), rng.uniform(0.0, 6.0, robot.n)
@@ -160,22 +164,22 @@ def _tested(robot: Robot, model: IdentifiedModel, columns: tuple[str, ...]) -> d
     q = 0.1 * np.sin(angle) + rng.uniform(-1.0, 1.0, robot.n)
     v, a = 0.1 * rates * np.cos(angle), -0.1 * rates**2 * np.sin(angle)
     logged = {name: 20.0 + rng.uniform(0.0, 20.0, len(t)) for name in columns}
-    tau = model.predicted(robot, Series(t, q, v, a, covariates=logged)).torque
-    column = np.stack(list(logged.values()), axis=1) if columns else np.zeros(0)
+    return Series(t, q, v, a, covariates=logged)
+
+
+def _tested(robot: Robot, model: IdentifiedModel, tested: Series) -> dict[str, str]:
+    """The test's series, and its torques."""
+    columns = [*tested.covariates.values()]
+    column = np.stack(columns, axis=1) if columns else np.zeros(0)
     return {
         "TESTED": str(_TESTED),
         "TEST_STEP": repr(_STEP),
-        "TEST_Q": _wrapped(q),
-        "TEST_V": _wrapped(v),
-        "TEST_A": _wrapped(a),
-        "TEST_TAU": _wrapped(tau),
-        "TEST_COLUMN": _wrapped(np.append(column, 0.0)),
+        "TEST_Q": wrapped(tested.q),
+        "TEST_V": wrapped(tested.v),
+        "TEST_A": wrapped(tested.a),
+        "TEST_TAU": wrapped(model.predicted(robot, tested).torque),
+        "TEST_COLUMN": wrapped(np.append(column, 0.0)),
     }
-
-
-def _wrapped(x: Array) -> str:
-    rows = np.atleast_2d(x)
-    return "\n    " + ",\n    ".join(reals(row) for row in rows)
 
 
 def _lines(words: object) -> str:

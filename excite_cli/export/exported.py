@@ -56,6 +56,7 @@ MODEL_FORMATS = {
     "mjcf": ".xml",
     "yaml": ".yaml",
     "c": ".c",
+    "ros2-package": "_dynamics",
     "randomization": "_randomization.json",
     "isaaclab": "_isaaclab.py",
     "mjlab": "_mjlab.py",

@@ -6,7 +6,10 @@
  *
  * excite_torque    torque at the next instant of a series, with what came before in `memory`
  * excite_series    torque at all instants of a recorded series, as the program's error table has it
+ * excite_state     torque in a state by itself: as at the first instant of a series
  * excite_load      torque of the rigid bodies alone
+ * excite_friction  torque of all friction that needs no series, at a given load of the gears
+ * excite_std       standard deviation of the torque in a state by itself@NO_STD@
  * excite_self_test largest deviation from recorded torques, relative to the largest of them
  * excite_detect    whether a residual says collision (where thresholds were given)
  *
@@ -179,51 +182,67 @@ static void gather(const real *all, real *out) /* out += what the followers ask 
         out[JOINT[j].driver] += JOINT[j].multiplier * all[j];
 }
 
-/* Recursive Newton-Euler; every body by its ten parameters, in which it is linear. */
-static void rigid_of_all(
-    const real body[M][10], const real *gravity, const real *q, const real *v, const real *a, real *tau)
+/* Of all joints: frames in those of their parents; in their own frames angular velocity, angular
+ * acceleration and acceleration of the origin, less gravity. */
+typedef struct {
+    real r[M][9], p[M][3], w[M][3], dw[M][3], acc[M][3];
+} motion;
+
+static inline void move(
+    const real *gravity, const real *q, const real *v, const real *a, motion *at)
 {
-    real r[M][9], p[M][3], w[M][3], dw[M][3], acc[M][3], f[M][3], n[M][3];
     static const real zero[3] = {0, 0, 0};
     const real up[3] = {-gravity[0], -gravity[1], -gravity[2]};
     for (int j = 0; j < M; ++j) {
         const int parent = JOINT[j].parent;
-        const real *u = JOINT[j].axis, *ten = body[j];
-        const real *w0 = parent < 0 ? zero : w[parent], *dw0 = parent < 0 ? zero : dw[parent];
-        const real *acc0 = parent < 0 ? up : acc[parent];
-        real x[3], y[3], lifted[3], h[3], z[3];
-        place(j, q[j], r[j], p[j]);
-        cross(w0, p[j], x);
+        const real *u = JOINT[j].axis, *p = at->p[j], *r = at->r[j];
+        const real *w0 = parent < 0 ? zero : at->w[parent], *dw0 = parent < 0 ? zero : at->dw[parent];
+        const real *acc0 = parent < 0 ? up : at->acc[parent];
+        real *w = at->w[j], *dw = at->dw[j], *acc = at->acc[j], x[3], y[3], lifted[3];
+        place(j, q[j], at->r[j], at->p[j]);
+        cross(w0, p, x);
         cross(w0, x, y);
-        cross(dw0, p[j], x);
+        cross(dw0, p, x);
         for (int i = 0; i < 3; ++i)
             lifted[i] = acc0[i] + x[i] + y[i];
-        into(r[j], lifted, acc[j]);
-        into(r[j], w0, w[j]);
-        into(r[j], dw0, dw[j]);
-        cross(w[j], u, x);
+        into(r, lifted, acc);
+        into(r, w0, w);
+        into(r, dw0, dw);
+        cross(w, u, x);
         if (JOINT[j].slides) {
             for (int i = 0; i < 3; ++i)
-                acc[j][i] += u[i] * a[j] + 2 * x[i] * v[j];
+                acc[i] += u[i] * a[j] + 2 * x[i] * v[j];
         } else {
             for (int i = 0; i < 3; ++i) {
-                dw[j][i] += u[i] * a[j] + x[i] * v[j];
-                w[j][i] += u[i] * v[j];
+                dw[i] += u[i] * a[j] + x[i] * v[j];
+                w[i] += u[i] * v[j];
             }
         }
-        h[0] = ten[1], h[1] = ten[2], h[2] = ten[3];
-        cross(dw[j], h, x);
-        cross(w[j], h, y);
-        cross(w[j], y, z);
+    }
+}
+
+/* Recursive Newton-Euler; every body by its ten parameters, in which it is linear. */
+static void rigid_of_all(
+    const real body[M][10], const real *gravity, const real *q, const real *v, const real *a, real *tau)
+{
+    motion at;
+    real f[M][3], n[M][3];
+    move(gravity, q, v, a, &at);
+    for (int j = 0; j < M; ++j) {
+        const real *ten = body[j], *h = ten + 1, *w = at.w[j], *dw = at.dw[j], *acc = at.acc[j];
+        real x[3], y[3], z[3];
+        cross(dw, h, x);
+        cross(w, h, y);
+        cross(w, y, z);
         for (int i = 0; i < 3; ++i)
-            f[j][i] = ten[0] * acc[j][i] + x[i] + z[i];
+            f[j][i] = ten[0] * acc[i] + x[i] + z[i];
         const real inertia[9] = {
             ten[4], ten[5], ten[7], ten[5], ten[6], ten[8], ten[7], ten[8], ten[9]};
         real spin[3] = {0, 0, 0}, moment[3] = {0, 0, 0};
-        out_of(inertia, w[j], spin);
-        out_of(inertia, dw[j], moment);
-        cross(w[j], spin, x);
-        cross(h, acc[j], y);
+        out_of(inertia, w, spin);
+        out_of(inertia, dw, moment);
+        cross(w, spin, x);
+        cross(h, acc, y);
         for (int i = 0; i < 3; ++i)
             n[j][i] = moment[i] + x[i] + y[i];
     }
@@ -233,9 +252,9 @@ static void rigid_of_all(
         tau[j] = u[0] * felt[0] + u[1] * felt[1] + u[2] * felt[2];
         if (parent >= 0) {
             real force[3] = {0, 0, 0}, lever[3];
-            out_of(r[j], f[j], force);
-            cross(p[j], force, lever);
-            out_of(r[j], n[j], n[parent]);
+            out_of(at.r[j], f[j], force);
+            cross(at.p[j], force, lever);
+            out_of(at.r[j], n[j], n[parent]);
             for (int i = 0; i < 3; ++i) {
                 f[parent][i] += force[i];
                 n[parent][i] += lever[i];
@@ -461,6 +480,14 @@ static inline void backlash(
 #undef PULL
 }
 
+/* Friction in all its forms but those with a memory, and those that follow time or a column. */
+static void add_friction(
+    real start, const real *s, const real *q, const real *v, const real *load, real *tau)
+{
+    (void)start, (void)s, (void)q, (void)v, (void)load, (void)tau;
+@FRICTION@
+}
+
 /* One instant: torque of the robot in `torque`, and with defects of the measurement in `tau`. */
 static void robot_torque(
     excite_memory *memory, const real *q, const real *v, const real *a, const real *column,
@@ -473,6 +500,7 @@ static void robot_torque(
     memcpy(tau, load, N * sizeof(real));
     (void)t, (void)start, (void)s, (void)a, (void)q, (void)column, (void)load_rate, (void)load_bend;
     (void)slopes, (void)tilted, (void)pushed, (void)dahl, (void)backlash;
+    add_friction(start, s, q, v, load, tau);
 @ROBOT_EFFECTS@
 }
 
@@ -485,16 +513,35 @@ static void measured_torque(
 @DEFECTS@
 }
 
+static int given(const real *q, const real *v, const real *a, const real *column)
+{
+    return all_finite(N, q) && all_finite(N, v) && all_finite(N, a)
+        && (!column || all_finite(EXCITE_COLUMNS, column));
+}
+
+static int answer(size_t count, int sound, real *x) /* 1 and NaN, unless all is finite */
+{
+    sound = sound && all_finite(count, x);
+    if (!sound)
+        spoil(count, x, 0);
+    return !sound;
+}
+
 int excite_load(const real q[N], const real v[N], const real a[N], real tau[N])
 {
-    int sound = all_finite(N, q) && all_finite(N, v) && all_finite(N, a);
-    if (sound) {
-        rigid(LOADED, GRAVITY, q, v, a, tau);
-        sound = all_finite(N, tau);
-    }
-    if (!sound)
-        spoil(N, tau, 0);
-    return !sound;
+    rigid(LOADED, GRAVITY, q, v, a, tau);
+    return answer(N, given(q, v, a, 0), tau);
+}
+
+/* `load`: torque that the gears carry. */
+int excite_friction(const real q[N], const real v[N], const real load[N], real tau[N])
+{
+    real s[N];
+    for (int j = 0; j < N; ++j)
+        s[j] = SIGN(v[j]);
+    memset(tau, 0, N * sizeof(real));
+    add_friction(0, s, q, v, load, tau);
+    return answer(N, given(q, v, load, 0), tau);
 }
 
 /* `step` between the instants [s]; `start` on the campaign's clock [s]. */
@@ -550,12 +597,6 @@ static inline void backward(
     }
 }
 
-static int given(const real *q, const real *v, const real *a, const real *column)
-{
-    return all_finite(N, q) && all_finite(N, v) && all_finite(N, a)
-        && (!column || all_finite(EXCITE_COLUMNS, column));
-}
-
 int excite_torque(
     excite_memory *memory, const real q[N], const real v[N], const real a[N],
     const real column[], real tau[N])
@@ -564,8 +605,7 @@ int excite_torque(
     excite_memory ahead = *memory;
     if (!memory->usable || !given(q, v, a, column)) {
         memory->count += 1;
-        spoil(N, tau, 0);
-        return 1;
+        return answer(N, 0, tau);
     }
     next(&ahead, q, v);
     rigid(LOADED, GRAVITY, q, v, a, load);
@@ -575,10 +615,15 @@ int excite_torque(
     if (RATES)
         backward(&ahead, torque, ahead.torque, rate, bend);
     measured_torque(q, v, column, load, torque, rate, tau);
-    if (kept(memory, &ahead, all_finite(N, load) && all_finite(N, torque) && all_finite(N, tau)))
-        return 0;
-    spoil(N, tau, 0);
-    return 1;
+    const int sound = all_finite(N, load) && all_finite(N, torque) && all_finite(N, tau);
+    return answer(N, kept(memory, &ahead, sound), tau);
+}
+
+int excite_state(const real q[N], const real v[N], const real a[N]@COLUMN@, real tau[N])
+{
+    excite_memory memory;
+    excite_begin(&memory, 1, 0);
+    return excite_torque(&memory, q, v, a, @COLUMN_GIVEN@, tau);
 }
 
 /* Central differences of rows; one-sided at the ends. */
@@ -714,6 +759,7 @@ real excite_self_test(void)
 }
 
 @DETECTOR@
+@STD@
 #ifdef EXCITE_MAIN
 #include <stdio.h>
 #include <time.h>
@@ -725,6 +771,9 @@ int main(void)
     real worst = excite_self_test();
 #ifdef EXCITE_DETECTOR
     worst = fmax(worst, excite_detector_self_test());
+#endif
+#ifdef EXCITE_STD
+    worst = fmax(worst, excite_std_self_test());
 #endif
     const long calls = EXCITE_CALLS;
     excite_memory memory;
@@ -741,6 +790,16 @@ int main(void)
     const double seconds = (double)(clock() - began) / CLOCKS_PER_SEC;
     printf("deviation %.2g of the largest torque; %.3f us per call (%g)\n", (double)worst,
         1e6 * seconds / (double)calls, (double)sum);
+#ifdef EXCITE_STD
+    const clock_t again = clock();
+    for (long k = 0; k < calls / 10; ++k) {
+        const size_t at = (size_t)k % TESTED;
+        excite_std(TEST_Q + at * N, TEST_V + at * N, TEST_A + at * N@STD_COLUMN@, tau);
+        sum += tau[0];
+    }
+    const double longer = (double)(clock() - again) / CLOCKS_PER_SEC;
+    printf("standard deviation: %.3f us per call (%g)\n", 1e7 * longer / (double)calls, (double)sum);
+#endif
     return worst <= (sizeof(real) == sizeof(float) ? R(1e-3) : R(1e-9)) ? 0 : 1;
 }
 #endif

@@ -222,7 +222,7 @@ def _friction(robot: Robot, model: IdentifiedModel, trace: TorqueTrace, speed: f
     body = RigidBody(robot, model.phi, trace.q, trace.v, still)
     total = np.zeros_like(trace.v)
     for effect, values in model.by_effect:
-        if "speed" not in effect.function_of or effect.over_time or effect.follows_covariate:
+        if not effect.is_friction:
             continue
         sides = [
             effect.torque(

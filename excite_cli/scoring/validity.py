@@ -55,7 +55,7 @@ _RANGE = 0.99  # quantile of the own data: beyond it a state is outside
 # Of 49 simulated robots as they are, four motions each that took no part (docs/decisions/
 # where-a-model-is-valid.md). Share of the mean square, and of the squared difference from the line:
 _MEAN = 0.2
-_CURVE = 0.05
+CURVE = 0.05
 _MOST = 9.0  # h: more is another fault than a fit's
 _SHARP = 12.0  # Hz: cut-off of torques that no filter averages
 _REVERSES = 0.5  # ρ that some sample must have, or the data show no reversal
@@ -124,7 +124,7 @@ class Validity:
         v, load, left = states.v, states.load, self.left(states)
         curve = states.torque - load - np.einsum("tjc,jc->tj", _line(states), self.line)
         stands = np.maximum(left, self.standing) + np.square(self.line[:, 1]) / 3.0
-        moves = left + _CURVE * np.square(curve)
+        moves = left + CURVE * np.square(curve)
         return np.asarray(np.sqrt(np.where(self.moves(v), moves, stands) + d**2))
 
 
@@ -220,7 +220,8 @@ class Trust:
             )
         self._robot, self._model = stored.robot, stored.model
         self.validity = validity_of(stored.traces, stored.processing)
-        self._root = self._root_of(stored)
+        # B (P + k, m) of the covariance B Bᵀ of φ and the effects; None where it is not known.
+        self.root = self._root_of(stored)
 
     def deviation(self, series: Series, found: Prediction) -> Array:
         """s (T, n) [N·m] (N) of the torque that was `found`."""
@@ -228,7 +229,7 @@ class Trust:
 
     def by_parameters(self, series: Series) -> Array:
         """d (T, n) [N·m] (N): of the torque by the covariance of the parameters; 0 if unknown."""
-        if self._root is None:
+        if self.root is None:
             return np.zeros_like(series.q)
         robot, model = self._robot, self._model
         effects = self._effects(series)
@@ -237,7 +238,7 @@ class Trust:
             part = slice(start, start + _AT_ONCE)
             body = RigidBody(robot, model.phi, series.q[part], series.v[part], series.a[part])
             columns = np.concatenate([body.regressor, effects[part]], axis=2)
-            found[part] = np.sqrt(np.square(columns @ self._root).sum(axis=2))
+            found[part] = np.sqrt(np.square(columns @ self.root).sum(axis=2))
         return found
 
     def _effects(self, series: Series) -> Array:

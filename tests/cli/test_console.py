@@ -58,7 +58,7 @@ def test_every_command_takes_the_flags_of_the_contract() -> None:
 
 
 def test_completion_knows_robots_formats_kinds_and_keys() -> None:
-    assert complete_format("r") == ["ros2", "rosbag2", "randomization"]
+    assert complete_format("r") == ["ros2", "rosbag2", "ros2-package", "randomization"]
     assert complete_format("") == [*MOTION_FORMATS.members, *MODEL_FORMATS]
     assert "ur10" in complete_robot("ur")
     assert complete_effect("spr") == ["spring@"]

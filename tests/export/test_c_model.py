@@ -15,7 +15,8 @@ from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.effects.viscous_friction import ViscousFriction
-from excite_cli.export.c_model import c_model, filled
+from excite_cli.export.c_model import c_model
+from excite_cli.export.c_text import filled
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.regression import Series
 from excite_cli.measurement.run_identity import RunId

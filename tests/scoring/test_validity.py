@@ -114,6 +114,13 @@ def test_a_curve_is_uncertain_where_it_leaves_the_straight_line() -> None:
     assert said(validity, v=2.0, torque=32.0)[0] == pytest.approx(np.sqrt(0.05) * curve, rel=0.05)
 
 
+def test_of_a_joint_that_only_stood_nothing_is_known_of_its_motion() -> None:
+    made = trace(0.2)
+    made = replace(made, v=np.where([True, False], 0.0, made.v))
+    assert deviation([made], 0.0, 5.0) == pytest.approx([0.2, 0.1], rel=0.1)
+    assert np.isinf(deviation([made], 0.1, 5.0)).tolist() == [True, False]
+
+
 def test_of_joints_without_samples_nothing_is_known() -> None:
     made = trace(0.2)
     made = replace(made, measured=np.where([False, True], made.measured, np.nan))
