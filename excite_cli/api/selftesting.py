@@ -15,17 +15,19 @@ from excite_cli.api.inspecting import bare_problem
 from excite_cli.api.loading import Case, load_data, measured_case
 from excite_cli.api.motions import Motions, is_motion, load_motions
 from excite_cli.api.simulating import configured_drive, simulate
+from excite_cli.config.trajectory_spec import TaskSpec
 from excite_cli.diagnosis.expectation import rows_as_recorded
-from excite_cli.diagnosis.power import power_of
+from excite_cli.diagnosis.foreseen import Foreseen, foresee
 from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.diagnosis.verdict import HeldOutVerdict
-from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.regressor import Regressor, standard_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import ConfigError, ExciteError, FileError, RobotError
 from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
 from excite_cli.measurement.dataset import Dataset
+from excite_cli.robot.model import Array
 from excite_cli.shown.note import Level, Note, Tell, log_note, never, unheard
 from excite_cli.simulation.ground_truth import PlantedEffect, parse_planted
 from excite_cli.simulation.mujoco_model import load_mujoco
@@ -40,6 +42,9 @@ from excite_cli.summary.selftest import selftest_answer as selftest_answer
 from excite_cli.trajectory.fade import Segment
 from excite_cli.workers.base import Workers
 
+_COUNTED = 1e-4  # noise of a torque that has none, as a share: positions are counted
+_LEAST = 1e-6  # of the largest torque, where inertias make none
+_INSTANTS = 500
 _SURE = (HeldOutVerdict.CONFIRMED, HeldOutVerdict.WEIGHED)
 
 
@@ -93,7 +98,7 @@ def selftest(
         usual = chosen or judging.usual_effects(case.robot, declared, settings.seed)
         chosen = judging.spread(usual, cases or len(usual), settings.seed)
     planted = {it.in_words(names): [it, *judging.beside(it, case.robot, declared)] for it in chosen}
-    power = dict(zip(planted, _predicted(case, segments, chosen, tell), strict=True))
+    foreseen = dict(zip(planted, _foreseen(case, segments, chosen, settings, tell), strict=True))
     task = _Task(case, segments, settings, planted)
     every = [StudyCase(f"case {k}", {"effect": it}, None, it) for k, it in enumerate(planted)]
     with tempfile.TemporaryDirectory() as folder:
@@ -106,7 +111,7 @@ def selftest(
         one = planted[words][0]
         size, (kind, joints) = one.named()[one.number], _name(one, names)
         told: dict[str, Any] = {**record.figures, "message": record.message}
-        told |= {"power": power[words], "seconds": record.seconds}
+        told |= {"seconds": record.seconds, **_in_advance(foreseen[words], names)}
         found.append(SelftestCase(words, kind, joints, size, **told))
     return Selftest(case.robot.name, names, tuple(found), len(every))
 
@@ -209,23 +214,65 @@ def _asked(case: Case, effects: Sequence[str], declared: Sequence[Effect]) -> li
     return found
 
 
-def _predicted(
-    case: Case, motions: Sequence[Segment], planted: Sequence[PlantedEffect], tell: Tell
-) -> list[float]:
-    """With what power these motions but the last show each; NaN where that is not known."""
+def _foreseen(
+    case: Case,
+    motions: Sequence[Segment],
+    planted: Sequence[PlantedEffect],
+    settings: SimulationSettings,
+    tell: Tell,
+) -> list[Foreseen | None]:
+    """What these motions but the last are expected to make of each; None where that is not known.
+
+    Noise of a row, of the URDF's torque τ at r' means a second, of recordings at rate r
+    with the share s and the correlation c from sample to sample:
+
+        ν RMS τ,    ν² = s² r' (1 + c) / (r (1 − c)).
+    """
+    declared = declared_effects(case.spec.effects, replace(case.robot, rows=case.robot.moved))
+    usual = judging.usual_effects(case.robot, declared, settings.seed)
+    asked = [each.effect for each in planted]
+    there = {effect.place for effect in asked}
+    possible = (*asked, *(it.effect for it in usual if it.effect.place not in there))
+    kept, correlation = motions[: max(1, len(motions) - 1)], settings.noise_correlation
+    independent = settings.rate * (1.0 - correlation) / (1.0 + correlation)
+    level = max(settings.torque_noise, _COUNTED) * float(np.sqrt(TaskSpec().rate / independent))
+    weights = 1.0 / (level * _usual_torque(case, kept))
+    by_row = dict(zip(case.robot.row_names, weights.tolist(), strict=True))
+    criterion = case.spec.criterion.model_copy(update={"row_weights": by_row})
+    spec = case.spec.model_copy(update={"criterion": criterion})
     try:
-        problem = bare_problem(case)
+        problem = bare_problem(replace(case, spec=spec), possible)
         objective, stack = problem.objective(), Stack.empty(problem.columns)
-        for each in motions[: max(1, len(motions) - 1)]:
+        for each in kept:
             rows = rows_as_recorded(problem, objective, each.coefficients, each.trajectory)
             stack = stack.with_rows(rows)
     except ExciteError as error:
-        tell(Note(Level.NOTE, f"no power is predicted: {error}"))
-        return [np.nan for _ in planted]
-    assert problem.prediction is not None
-    alpha, found = case.spec.diagnosis.significance, []
-    for one in planted:
-        kind, joints = _name(one, case.robot.joint_names)
-        shown = power_of(problem.prediction, stack, alpha, kind, abs(float(one.values[0])))
-        found.append(next((it.power for it in shown if it.joints == joints), np.nan))
-    return found
+        tell(Note(Level.NOTE, f"no outcome is predicted: {error}"))
+        return [None for _ in planted]
+    prediction, alpha = problem.prediction, case.spec.diagnosis.significance
+    assert prediction is not None
+    return [
+        foresee(prediction, stack, alpha, one.effect, one.values, level)
+        if one.effect in prediction.extension.effects
+        else None
+        for one in planted
+    ]
+
+
+def _in_advance(found: Foreseen | None, joints: Sequence[str]) -> dict[str, Any]:
+    """What was predicted of a case, by the names of its fields."""
+    if found is None:
+        return {}
+    rival = [] if found.rival is None else [(found.rival[0], tuple(joints[j] for j in found.rival[1]))]
+    said = judging.predicted(found.named, found.apart, found.absorbed)
+    return {"power": found.named, "apart": found.apart, "rival": _listed(rival), "predicted": said}
+
+
+def _usual_torque(case: Case, motions: Sequence[Segment]) -> Array:
+    """RMS (R,) of the torque of every row that the URDF's inertias make on these motions."""
+    instants = [np.linspace(0.0, it.trajectory.duration, _INSTANTS) for it in motions]
+    states = [it.at(t) for it, t in zip(motions, instants, strict=True)]
+    y = [Regressor(case.robot).evaluate(*each) for each in states]
+    tau = np.concatenate(y) @ standard_parameters(case.robot)
+    rms = np.sqrt(np.mean(np.square(tau), axis=0))
+    return np.asarray(np.maximum(rms, _LEAST * rms.max()))
