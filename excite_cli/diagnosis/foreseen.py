@@ -1,13 +1,19 @@
 """What a diagnosis will make of an effect of known size, before it is tried.
 
 With G = CᵀC of the recordings and k the columns that an effect p is tried beside, both as in
-`power.py`, let S = G − G_·k (G_kk + P)⁻¹ G_k·, and z the parameters of p in prior deviations. Of its
-torque nothing in k imitates the energy λ = zᵀ S_pp z [χ²]. It is named with the probability
+`power.py`, let S = G − G_·k (G_kk + P)⁻¹ G_k·, and z the parameters of p in prior deviations.
+Nothing in k imitates the energy λ = zᵀ S_pp z [χ²] of its torque. It is named with the probability
 
     Φ(√λ − √c) + Φ(−√λ − √c),
 
 c its price, unless ν √(λ/N), a share of the torque's RMS, is below `rules.SMALLEST`: ν is the noise
-of a sample as such a share, N the number of samples. Another effect d cannot imitate
+of a sample as such a share, N the number of samples. Fitted in its place, k leaves of it the energy
+E_b in block b of the held-out recording. Drawn with replacement, blocks confirm it (2.5 % of the
+draws may say otherwise, `held_out_verdict.py`) with about the probability
+
+    Φ(Σ E_b / √(Σ (E_b − Ē)² + 4 Σ E_b) − 1.96):
+
+what shows in a few blocks only is not confirmed, however large. Another effect d cannot imitate
 
     E = zᵀ (S_pp − S_pd S_dd⁻¹ S_dp) z
 
@@ -22,84 +28,102 @@ import numpy as np
 from scipy.stats import norm
 
 from excite_cli.diagnosis import rules
-from excite_cli.diagnosis.power import RIDGE, TEXTBOOK, chance, price
+from excite_cli.diagnosis.power import RIDGE, TEXTBOOK, price, probability_named
 from excite_cli.diagnosis.schur import ABSORBED
 from excite_cli.effects.base import Effect
 from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.prediction import Prediction
 from excite_cli.robot.model import Array
 
+_CONFIRMED = norm.ppf(0.975)
 _NOTHING = 1e-12  # of an energy: rounding
 
 
 @dataclass(frozen=True)
 class Foreseen:
-    """Probabilities that an effect is `named`, and preferred to its nearest `rival` (`apart`).
+    """Probabilities that an effect is `named` and confirmed, and preferred to a `rival` (`apart`).
 
-    `absorbed`: inertias take it up; `rival`: kind and joints, by number; () where there is none.
+    `absorbed`: inertias take it up; `rival`: kind and names of joints.
     """
 
     named: float
     apart: float = 1.0
     absorbed: bool = False
-    rival: tuple[str, tuple[int, ...]] | None = None
+    rival: tuple[str, tuple[str, ...]] | None = None
 
 
 def foresee(
     prediction: Prediction,
     stack: Stack,
+    blocks: Array | None,
     significance: float,
     effect: Effect,
     values: Array,
     noise: float,
 ) -> Foreseen:
-    """For `effect`, one of the prediction's, with its parameters `values` in their units.
+    """For `effect` with its parameters `values` in their units.
 
-    `noise`: ν of the module, that of the rows in `stack`.
+    `blocks` (B, m, c): rows of the held-out recording, cut into blocks; None where others are sure
+    to be confirmed with it. `noise`: ν of the module, that of all rows. What is none of the
+    prediction's effects shows on no motion.
     """
-    own = prediction.extension.effects.index(effect)
+    if effect not in prediction.extension.effects:
+        return Foreseen(0.0)
+    effects, rank = prediction.extension.effects, prediction.rank
+    own, gram = effects.index(effect), stack.factor.T @ stack.factor
     slices = prediction.extension.columns().slices
-    blocks = [np.arange(part.start, part.stop) + prediction.rank for part in slices]
-    p, gram = blocks[own], stack.factor.T @ stack.factor
-    z = values / prediction.extension.scales[p - prediction.rank]
-    declared, beside = [np.arange(prediction.rank)], [np.arange(prediction.rank)]
-    rivals: list[int] = []
-    for at, each in enumerate(prediction.extension.effects):
-        if at < prediction.declared:
-            declared.append(blocks[at])
-        if at == own:
-            continue
-        if at < prediction.declared or each.kind in TEXTBOOK:
-            beside.append(blocks[at])
-        elif len(blocks[at]) <= len(p) and effect.kind not in each.refines:
-            rivals.append(at)
-    bare = _left(gram, np.concatenate(declared), prediction.rank)[p[0], p[0]]
-    if not effect.refines and bare <= ABSORBED * gram[p[0], p[0]]:
+    columns = [np.arange(part.start, part.stop) + rank for part in slices]
+    p, z = columns[own], values / prediction.extension.scales[columns[own] - rank]
+    there = [at for at in range(prediction.declared) if at != own]
+    textbook = [at for at, it in enumerate(effects) if it.kind in TEXTBOOK and at != own]
+    beside = sorted({*there, *textbook})
+    rivals = [
+        at
+        for at, it in enumerate(effects)
+        if at not in (own, *beside) and len(columns[at]) <= len(p) and effect.kind not in it.refines
+    ]
+
+    def left_by(some: list[int]) -> tuple[Array, Array]:
+        return _left(gram, np.concatenate([np.arange(rank), *(columns[k] for k in some)]), rank)
+
+    bare, _ = left_by(there)
+    if not effect.refines and bare[p[0], p[0]] <= ABSORBED * gram[p[0], p[0]]:
         return Foreseen(0.0, absorbed=True)
-    left = _left(gram, np.concatenate(beside), prediction.rank)
+    left, residual = left_by(beside)
     energy, cost = float(z @ left[np.ix_(p, p)] @ z), price(type(effect), significance)
     samples = max(1.0, stack.rows / len(prediction.usual))
     if not energy > 0.0 or noise * np.sqrt(energy / samples) < rules.SMALLEST:
         return Foreseen(0.0)
+    named = probability_named(float(np.sqrt(energy)), cost)
+    if blocks is not None:
+        missed = np.square(blocks @ residual[:, p] @ z).sum(axis=1)
+        spread = np.sqrt(np.square(missed - missed.mean()).sum() + 4.0 * missed.sum())
+        named *= float(norm.cdf(missed.sum() / max(spread, _NOTHING) - _CONFIRMED))
     preferred: list[tuple[float, int]] = []
     for at in rivals:
-        d = blocks[at]
+        d = columns[at]
         solved = np.linalg.lstsq(left[np.ix_(d, d)], left[np.ix_(d, p)] @ z, rcond=1e-6)[0]
         alone = max(energy - float(z @ left[np.ix_(p, d)] @ solved), _NOTHING * energy)
-        dearer = price(type(prediction.extension.effects[at]), significance) - cost
+        dearer = price(type(effects[at]), significance) - cost
         preferred.append((float(norm.cdf(0.5 * (alone + dearer) / np.sqrt(alone))), at))
-    named = chance(float(np.sqrt(energy)), cost)
     if not preferred:
         return Foreseen(named)
     apart, at = min(preferred)
-    rival = prediction.extension.effects[at]
-    return Foreseen(named, apart, rival=(rival.kind, rival.joints))
+    names = prediction.extension.robot.joint_names
+    return Foreseen(
+        named, apart, False, (effects[at].kind, tuple(names[j] for j in effects[at].joints))
+    )
 
 
-def _left(gram: Array, beside: Array, rank: int) -> Array:
-    """S (c, c): what the columns `beside`, of which the first `rank` are inertias, leave of all."""
+def _left(gram: Array, beside: Array, rank: int) -> tuple[Array, Array]:
+    """S (c, c) of what the columns `beside` leave, of which the first `rank` are inertias.
+
+    And T (c, c): rows times T are what they leave of rows, fitted to the data of `gram`.
+    """
     known = gram[np.ix_(beside, beside)] + np.diag(np.where(beside < rank, 0.0, 1.0))
     known[np.diag_indices(rank)] *= 1.0 + RIDGE
     size = np.sqrt(np.maximum(np.diag(known), 1e-300))
     inverse = np.linalg.pinv(known / np.outer(size, size), hermitian=True) / np.outer(size, size)
-    return np.asarray(gram - gram[:, beside] @ inverse @ gram[beside])
+    residual = np.eye(len(gram))
+    residual[beside] -= inverse @ gram[beside]
+    return gram @ residual, residual

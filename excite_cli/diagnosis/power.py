@@ -87,7 +87,7 @@ def power_of(
         effect, scale, share = _about(prediction, at)
         if effect.kind == kind:
             times = size / scale / deviation
-            chance = chance(times, price(type(effect), significance))
+            chance = probability_named(times, price(type(effect), significance))
             if share * size / scale < (1.0 - _ROUNDING) * rules.SMALLEST:
                 chance = 0.0
             found.append(_record(prediction, effect, size, share * size / scale, chance, times))
@@ -144,10 +144,10 @@ def _shown(
 def times_named(cost: float, power: float) -> float:
     """Size, in standard deviations, that is named with this power at the price `cost` [χ²]."""
     low, high = 0.0, np.sqrt(cost) - norm.ppf(min(1.0 - power, 0.5)) + 1.0
-    return float(brentq(lambda times: chance(times, cost) - power, low, high))
+    return float(brentq(lambda times: probability_named(times, cost) - power, low, high))
 
 
-def chance(times: float, cost: float) -> float:
+def probability_named(times: float, cost: float) -> float:
     """Φ(x − √c) + Φ(−x − √c)."""
     least = np.sqrt(cost)
     return float(norm.sf(least - times) + norm.sf(least + times))

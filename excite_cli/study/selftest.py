@@ -8,17 +8,16 @@ With S the effects that an answer confirms, and p the planted one on its joints,
                 on a joint of p; or where the answer lists p among those that inertias take up;
     not found   else.
 
-The first that holds counts. Before it is tried, with the probability a that the effect is named and
-b that it is preferred to every other effect (`diagnosis/foreseen.py`), the outcome is predicted as
+The first that holds counts. What was planted beside p, since p refines it, is neither asked for nor
+wrong; nor is what an answer names without confirming it. Before the trial, with the probabilities a
+that p is named and confirmed, and b that it is preferred to every other effect, both of
+`diagnosis/foreseen.py`, the outcome is predicted as
 
-    confounded  where inertias take it up;
+    confounded  where inertias take p up;
     not found   where a ≤ 0.2;
     confounded  where b ≤ 0.2;
     found       where a b ≥ 0.8;
     open        else.
-
-What was planted beside p, since p refines it, is neither asked for nor
-wrong; nor is what an answer names without confirming it.
 """
 
 from collections.abc import Collection, Sequence
