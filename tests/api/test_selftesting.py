@@ -56,6 +56,12 @@ def test_what_is_found_and_what_is_not(result: Result) -> None:
     assert [each["outcome"] for each in answer.data["cases"]] == ["found", "not found"]
 
 
+def test_a_zero_that_lies_elsewhere_is_an_encoder_offset(result: Result) -> None:
+    found = selftest(load_case(SMOKE), result, ["encoder_offset@elbow=0.15"])
+    assert found.cases[0].outcome == found.cases[0].predicted == Outcome.FOUND
+    assert found.cases[0].named == "encoder_offset@elbow"
+
+
 def test_more_noise_is_less_power(result: Result) -> None:
     case, effect = load_case(SMOKE), "torque_gain@elbow=0.02"
     powers = []

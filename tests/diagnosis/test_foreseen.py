@@ -94,7 +94,7 @@ def test_inertias_take_up_what_no_motion_separates_from_them(problem: Problem) -
     assert found.named == 0.0
     other = effect_of(problem, "armature", "elbow")
     assert not foresee(
-        of(problem), stacked(problem, 1), 0.01, other, np.array([1.0]), NOISE
+        of(problem), stacked(problem, 1), None, 0.01, other, np.array([1.0]), NOISE
     ).absorbed
 
 
@@ -105,3 +105,19 @@ def test_what_shows_on_no_motion_is_not_named(problem: Problem) -> None:
         foresee(of(problem), stacked(problem, 1), None, 0.01, effect, np.ones(1), NOISE).named
         == 0.0
     )
+
+
+def test_what_shows_in_few_held_out_blocks_is_not_confirmed(problem: Problem) -> None:
+    """The same energy in twelve blocks and in two: of these a draw may have none."""
+    block = problem.objective().block(drawn(problem, 0.3, 1))
+    stack, effect = stacked(problem, 1), effect_of(problem, "load_dependent_friction", "elbow")
+    whole = block.reshape(12, -1, block.shape[1])
+    few = np.zeros_like(whole)
+    few[:2] = np.sqrt(6.0) * whole[:2]
+    of_whole, of_few, of_none = (
+        foresee(of(problem), stack, each, 0.01, effect, np.array([0.2]), NOISE).named
+        for each in (whole, few, 0.0 * whole)
+    )
+    assert of_whole > 0.95
+    assert of_few < 0.6
+    assert of_none < 0.05
