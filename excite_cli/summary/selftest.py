@@ -1,6 +1,6 @@
 """What a self-test found, in a sentence, tables and as data."""
 
-from math import isnan
+from math import isnan, nan
 
 from excite_cli.fields import data_of
 from excite_cli.shown.answer import (
@@ -41,10 +41,9 @@ def selftest_answer(found: Selftest, verbose: bool = False, folder: str = "") ->
     data = {"robot": found.robot, "asked": found.asked, "outcomes": counts}
     data |= {"cases": data_of(found.cases), "output": folder or None}
     parts = _parts(found)
-    if verbose:
-        parts += [_details(found), _MORE]
-    elif found.cases:
-        parts.append("(--verbose shows sizes, errors, and what else was confirmed.)")
+    if found.cases:
+        hint = "(--verbose shows sizes, errors, and what else was confirmed.)"
+        parts += [_details(found), _MORE] if verbose else [hint]
     return Answer((*parts, *([folder] if folder else [])), data, found.good)
 
 
@@ -102,10 +101,10 @@ def _cases(found: Selftest) -> Table:
     rows = [
         {
             **_place(case),
-            "power": "-" if isnan(case.power) else f"{case.power:.0%}",
+            "power": _or_none(case.power, f"{case.power:.0%}"),
             "predicted": case.predicted or "-",
             "seen": case.outcome,
-            "size": "-" if isnan(case.found) else f"{case.found / case.planted:.0%}",
+            "size": _or_none(case.found, f"{case.found / (case.planted or nan):.0%}"),
         }
         for case in _in_order(found)
     ]
@@ -117,9 +116,7 @@ def _details(found: Selftest) -> Table:
         {
             **_place(case),
             "planted": figure(case.planted),
-            "found ± std": "-"
-            if isnan(case.found)
-            else f"{figure(case.found)} ± {figure(case.std)}",
+            "found ± std": _or_none(case.found, f"{figure(case.found)} ± {figure(case.std)}"),
             "unit": case.unit,
             "before": percent(case.before),
             "after": percent(case.after),
@@ -132,6 +129,10 @@ def _details(found: Selftest) -> Table:
     ]
     words = ("like", "confirmed")
     return Table.of("Sizes and errors", rows, ("effect", "where", "unit"), words)
+
+
+def _or_none(value: float, text: str) -> str:
+    return "-" if isnan(value) else text
 
 
 def _place(case: SelftestCase) -> dict[str, str]:
