@@ -37,17 +37,15 @@ def foreseen_outcomes(
 ) -> list[Foreseen | None]:
     """What these motions but the last are expected to make of each; None where that is not known.
 
-    Noise of a row, of the URDF's torque τ at r' means a second, of recordings at rate r
-    with the share s and the correlation c from sample to sample:
+    Rows are means over m samples, with the noise ν RMS τ, τ the torque of the URDF's inertias. With
+    s the noise of a sample as a share, and c its correlation from sample to sample,
 
-        ν RMS τ,    ν² = s² r' (1 + c) / (r (1 − c)).
+        ν² = s²/m ((1 + c)/(1 − c) − 2 c (1 − c^m) / (m (1 − c)²)).
     """
     declared = declared_effects(case.spec.effects, replace(case.robot, rows=case.robot.moved))
     usual = usual_effects(case.robot, declared if case.spec.effects else (), settings.seed)
     possible = list({it.effect.place: it.effect for it in (*usual, *planted)}.values())
-    kept, correlation = motions[: max(1, len(motions) - 1)], settings.noise_correlation
-    independent = settings.rate * (1.0 - correlation) / (1.0 + correlation)
-    level = max(settings.torque_noise, _COUNTED) * float(np.sqrt(TaskSpec().rate / independent))
+    kept, level = motions[: max(1, len(motions) - 1)], _noise_of_means(settings)
     weights = 1.0 / (level * _usual_torque(case, kept))
     by_row = dict(zip(case.robot.row_names, weights.tolist(), strict=True))
     criterion = case.spec.criterion.model_copy(update={"row_weights": by_row})
@@ -78,6 +76,14 @@ def foreseen_outcomes(
         return foresee(prediction, stack, held, alpha, one.effect, one.values, level)
 
     return [found(each) for each in planted]
+
+
+def _noise_of_means(settings: SimulationSettings) -> float:
+    """ν of `foreseen_outcomes`; where a mean has less than one sample, so much larger."""
+    c, m = settings.noise_correlation, max(1.0, settings.rate / TaskSpec().rate)
+    of_one = (1.0 + c) / (1.0 - c) - 2.0 * c * (1.0 - c**m) / (m * (1.0 - c) ** 2)
+    fewer = max(1.0, TaskSpec().rate / settings.rate)
+    return max(settings.torque_noise, _COUNTED) * float(np.sqrt(of_one / m * fewer))
 
 
 def _usual_torque(case: Case, motions: Sequence[Segment]) -> Array:

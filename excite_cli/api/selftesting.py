@@ -24,7 +24,7 @@ from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
-from excite_cli.errors import ConfigError, FileError, RobotError
+from excite_cli.errors import ConfigError, ContradictionError, FileError, RobotError
 from excite_cli.excitation.problem import Problem
 from excite_cli.measurement.dataset import Dataset
 from excite_cli.report.page import render
@@ -161,16 +161,24 @@ def do_case(task: _Task, case: StudyCase, tell: Callable[[str], None]) -> DoneCa
     tell("simulating")
     words = [each.in_words(task.case.robot.joint_names) for each in planted]
     data = simulate(task.case, task.motions, words, task.settings, tell=unheard).dataset
-    found = diagnose(task.case, data, progress=lambda text, done: tell(text), tell=unheard)
-    return DoneCase(_figures(found, planted, task.case), {}, time.perf_counter() - began)
+    try:
+        found = diagnose(task.case, data, progress=lambda text, done: tell(text), tell=unheard)
+        figures = _figures(found, planted, task.case)
+    except ContradictionError as refused:  # that names what was planted is an answer, too
+        own, *others = (_name(each, task.case.robot.joint_names) for each in planted)
+        said = _of_zeros(refused.faults)
+        outcome, _ = judging.judge(own, said, others)
+        if outcome is not judging.Outcome.FOUND:
+            raise
+        figures = {"outcome": str(outcome), "named": _listed([each.name for each in said])}
+    return DoneCase(figures, {}, time.perf_counter() - began)
 
 
 def _figures(found: Diagnosis, planted: Sequence[PlantedEffect], case: Case) -> Figures:
     one, robot = planted[0], case.robot
     own, *others = (_name(each, robot.joint_names) for each in planted)
     said = [_said(found, each) for each in found.effects]
-    zeros = [it for each in found.findings if each.kind == "zero" for it in each.joints]
-    said += [Said(("encoder_offset", (it,))) for it in zeros]  # a set-up with that is one
+    said += _of_zeros([(each.kind, each.joints) for each in found.findings])
     absorbed = [(each.kind, each.joints) for each in found.absorbed]
     outcome, wrong = judging.judge(own, said, others, absorbed)
     figures: dict[str, float | int | str | None] = {
@@ -188,6 +196,12 @@ def _figures(found: Diagnosis, planted: Sequence[PlantedEffect], case: Case) -> 
         if (each.effect.kind, each.effect.joints) == own and value is not None:
             figures |= {"found": value.value, "std": value.std}
     return figures
+
+
+def _of_zeros(found: Sequence[Name]) -> list[Said]:
+    """Joints whose zero is found to lie elsewhere have an encoder offset."""
+    joints = [joint for kind, names in found if kind == "zero" for joint in names]
+    return [Said(("encoder_offset", (joint,))) for joint in joints]
 
 
 def _name(planted: PlantedEffect, joints: Sequence[str]) -> Name:

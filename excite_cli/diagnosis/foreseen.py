@@ -19,7 +19,9 @@ what shows in a few blocks only is not confirmed, however large. Another effect 
 
 of it. Of a robot that has p, what p saves beyond d is about N(E, 4 E), so that p is preferred with
 the probability Φ((E + c_d − c_p) / 2√E). Where base parameters and declared effects alone leave
-less than 0.1 % of the energy of p, inertias take it up, and a diagnosis lists it as such.
+less than 0.1 % of the energy of p, inertias take it up, and a diagnosis lists it as such. What the
+textbook has on every joint is in the model from `rules.MATTERS` on, whatever it costs and whatever
+is like it; two standard deviations confirm it.
 """
 
 from dataclasses import dataclass
@@ -36,6 +38,7 @@ from excite_cli.excitation.prediction import Prediction
 from excite_cli.robot.model import Array
 
 _CONFIRMED = norm.ppf(0.975)
+_DOUBT = 4.0  # χ² of two standard deviations
 _NOTHING = 1e-12  # of an energy: rounding
 
 
@@ -92,9 +95,11 @@ def foresee(
     left, residual = left_by(beside)
     energy, cost = float(z @ left[np.ix_(p, p)] @ z), price(type(effect), significance)
     samples = max(1.0, stack.rows / len(prediction.usual))
-    if not energy > 0.0 or noise * np.sqrt(energy / samples) < rules.SMALLEST:
+    share = noise * np.sqrt(max(energy, 0.0) / samples)
+    if not share >= rules.SMALLEST:
         return Foreseen(0.0)
-    named = probability_named(float(np.sqrt(energy)), cost)
+    always = effect.kind in TEXTBOOK and share >= rules.MATTERS
+    named = probability_named(float(np.sqrt(energy)), _DOUBT if always else cost)
     if blocks is not None:
         missed = np.square(blocks @ residual[:, p] @ z).sum(axis=1)
         spread = np.sqrt(np.square(missed - missed.mean()).sum() + 4.0 * missed.sum())
@@ -106,7 +111,7 @@ def foresee(
         alone = max(energy - float(z @ left[np.ix_(p, d)] @ solved), _NOTHING * energy)
         dearer = price(type(effects[at]), significance) - cost
         preferred.append((float(norm.cdf(0.5 * (alone + dearer) / np.sqrt(alone))), at))
-    if not preferred:
+    if always or not preferred:
         return Foreseen(named)
     apart, at = min(preferred)
     names = prediction.extension.robot.joint_names
