@@ -18,13 +18,15 @@ from excite_cli import (
     selftest,
     simulate,
 )
-from excite_cli.api import selftesting
+from excite_cli.api import foreseeing, selftesting
 from excite_cli.api.foreseeing import foreseen_outcomes
 from excite_cli.api.motions import load_motions
 from excite_cli.api.selftesting import selftest_answer, usual_settings
+from excite_cli.errors import ContradictionError
 from excite_cli.shown.note import unheard
 from excite_cli.simulation.ground_truth import parse_planted
 from excite_cli.simulation.settings import SimulationSettings
+from excite_cli.simulation.simulate import _noise
 from excite_cli.study.selftest import Outcome
 
 SMOKE = Path(__file__).resolve().parents[2] / "configs" / "smoke.yaml"
@@ -60,6 +62,31 @@ def test_a_zero_that_lies_elsewhere_is_an_encoder_offset(result: Result) -> None
     found = selftest(load_case(SMOKE), result, ["encoder_offset@elbow=0.15"])
     assert found.cases[0].outcome == found.cases[0].predicted == Outcome.FOUND
     assert found.cases[0].named == "encoder_offset@elbow"
+
+
+@pytest.mark.parametrize(("joint", "outcome"), [("elbow", "found"), ("slide", "failed")])
+def test_a_refusal_that_names_the_zero_is_an_answer(
+    result: Result, monkeypatch: pytest.MonkeyPatch, joint: str, outcome: str
+) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise ContradictionError("the measured data contradict the robot", [("zero", (joint,))])
+
+    monkeypatch.setattr(selftesting, "diagnose", refuse)
+    asked = ["encoder_offset@elbow=0.15"]
+    if outcome == "found":
+        assert selftest(load_case(SMOKE), result, asked).cases[0].outcome == Outcome.FOUND
+    else:
+        with pytest.raises(FileError, match="every case failed: the measured data contradict"):
+            selftest(load_case(SMOKE), result, asked)
+
+
+@pytest.mark.parametrize(("correlation", "rate"), [(0.0, 500.0), (0.9, 500.0), (-0.3, 40.0)])
+def test_the_noise_of_means_is_that_of_drawn_means(correlation: float, rate: float) -> None:
+    settings = SimulationSettings(rate=rate, torque_noise=0.05, noise_correlation=correlation)
+    size = round(rate / 20.0)
+    drawn = _noise((200_000, 1), correlation, np.random.default_rng(1))
+    means = drawn[: len(drawn) // size * size].reshape(-1, size).mean(axis=1)
+    assert foreseeing._noise_of_means(settings) == pytest.approx(0.05 * means.std(), rel=0.03)
 
 
 def test_more_noise_is_less_power(result: Result) -> None:

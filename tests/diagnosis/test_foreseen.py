@@ -53,7 +53,7 @@ def test_the_likelier_of_two_is_preferred_as_often_as_told(problem: Problem) -> 
     prediction, rng = of(problem), np.random.default_rng(5)
     block = problem.objective().block(drawn(problem, 0.3, 1))
     stack = Stack.empty(problem.columns).with_rows(block)
-    effect, values = effect_of(problem, "armature", "elbow"), np.array([1e-3])
+    effect, values = effect_of(problem, "load_dependent_friction", "elbow"), np.array([1e-3])
     for _ in range(30):
         found = foresee(prediction, stack, None, 0.01, effect, values, 1.0)
         if found.apart > 0.8:
@@ -78,7 +78,7 @@ def test_the_likelier_of_two_is_preferred_as_often_as_told(problem: Problem) -> 
     q, _ = np.linalg.qr(fixed)
     seen = [each - q @ (q.T @ each) for each in both]
     size = values[0] / prediction.extension.scales[p - prediction.rank]
-    dearer = price(type(rival), 0.01) - price(kind_named("armature"), 0.01)
+    dearer = price(type(rival), 0.01) - price(type(effect), 0.01)
     preferred = 0
     for _ in range(1000):
         rows = size * seen[0] + rng.normal(size=len(fixed))
@@ -121,3 +121,17 @@ def test_what_shows_in_few_held_out_blocks_is_not_confirmed(problem: Problem) ->
     assert of_whole > 0.95
     assert of_few < 0.6
     assert of_none < 0.05
+
+
+def test_what_the_textbook_has_is_confirmed_from_two_deviations_on(problem: Problem) -> None:
+    """Whatever it costs, but for what is too small to stay in the model."""
+    effect = effect_of(problem, "viscous_friction", "elbow")
+    stack = stacked(problem, 1)
+    powers = power_of(of(problem), stack, 0.01, "viscous_friction", 1.0)
+    two = 2.0 / next(it.times for it in powers if it.joints == ("elbow",))
+    large, small = (
+        foresee(of(problem), stack, None, 0.01, effect, np.array([two]), noise)
+        for noise in (1.0, 1e-2 * rules.MATTERS)
+    )
+    assert large.named == pytest.approx(0.5, abs=0.01)
+    assert small.named < 0.1
