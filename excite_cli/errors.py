@@ -7,7 +7,7 @@ that is not an `ExciteError` is a bug of this program (exit status 70).
 import difflib
 import errno
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 _ENOUGH_TO_GUESS = 3  # letters
 
@@ -36,6 +36,14 @@ class RobotError(ExciteError):
 
 class FileError(ExciteError):
     """A file that was given cannot be read, is of another program, or must not be overwritten."""
+
+
+class ContradictionError(FileError):
+    """Data that cannot be of the robot as it is set up; `faults`: what is wrong on which joints."""
+
+    def __init__(self, message: str, faults: Sequence[tuple[str, tuple[str, ...]]] = ()) -> None:
+        super().__init__(message)
+        self.faults = tuple(faults)
 
 
 class MissingExtraError(ExciteError):

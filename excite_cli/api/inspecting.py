@@ -35,6 +35,7 @@ from excite_cli.config.plain_yaml import yaml_text
 from excite_cli.config.trajectory_spec import TaskSpec
 from excite_cli.diagnosis.measured_prior import measured_stack
 from excite_cli.diagnosis.power import EffectPower, sizes_shown
+from excite_cli.effects.base import Effect
 from excite_cli.errors import ConfigError, ExciteError
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.identification.prepare import prepare_all
@@ -168,13 +169,16 @@ def power_of_data(case: Case, data: Dataset) -> tuple[EffectPower, ...]:
     return sizes_shown(problem.prediction, stack, case.spec.diagnosis.significance)
 
 
-def bare_problem(case: Case) -> Problem:
-    """What is unknown of a robot, for motions that are there: no constraint asks for more."""
+def bare_problem(case: Case, possible: Sequence[Effect] | None = None) -> Problem:
+    """What is unknown of a robot, for motions that are there: no constraint asks for more.
+
+    `possible`: effects that it may have, in place of the usual ones.
+    """
     spec = case.spec
     criterion = spec.criterion.model_copy(update={"kind": "predicted_torque"})
     bare = ConstraintsSpec(joint_limits=spec.constraints.joint_limits)  # no motion is sought
     update = {"criterion": criterion, "constraints": bare, "task": TaskSpec()}
-    return build_problem(spec.model_copy(update=update), case.folder)
+    return build_problem(spec.model_copy(update=update), case.folder, possible=possible)
 
 
 def _in_vain(settings: Mapping[str, Any], error: ExciteError) -> CheckResult:

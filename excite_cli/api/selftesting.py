@@ -1,5 +1,6 @@
 """Whether a robot's motions would give away what its model lacks: `excite selftest`."""
 
+import hashlib
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -11,22 +12,23 @@ import numpy as np
 
 from excite_cli.api.arguments import checked
 from excite_cli.api.diagnosing import diagnose
-from excite_cli.api.inspecting import bare_problem
+from excite_cli.api.foreseeing import foreseen_outcomes, states_of
 from excite_cli.api.loading import Case, load_data, measured_case
 from excite_cli.api.motions import Motions, is_motion, load_motions
 from excite_cli.api.simulating import configured_drive, simulate
-from excite_cli.diagnosis.expectation import rows_as_recorded
-from excite_cli.diagnosis.power import power_of
+from excite_cli.atomic import write_text_atomically
+from excite_cli.config.load_spec import spec_as_yaml
+from excite_cli.diagnosis.foreseen import Foreseen
 from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
-from excite_cli.errors import ConfigError, ExciteError, FileError, RobotError
-from excite_cli.excitation.objective import Stack
+from excite_cli.errors import ConfigError, ContradictionError, FileError, RobotError
 from excite_cli.excitation.problem import Problem
 from excite_cli.measurement.dataset import Dataset
-from excite_cli.shown.note import Level, Note, Tell, log_note, never, unheard
+from excite_cli.report.page import render
+from excite_cli.shown.note import Tell, log_note, never, unheard
 from excite_cli.simulation.ground_truth import PlantedEffect, parse_planted
 from excite_cli.simulation.mujoco_model import load_mujoco
 from excite_cli.simulation.settings import SimulationSettings
@@ -37,9 +39,11 @@ from excite_cli.study.records import StudyNews
 from excite_cli.study.records import run_study as run_cases
 from excite_cli.study.selftest import Name, Said, Selftest, SelftestCase
 from excite_cli.summary.selftest import selftest_answer as selftest_answer
+from excite_cli.summary.selftest import selftest_page
 from excite_cli.trajectory.fade import Segment
 from excite_cli.workers.base import Workers
 
+PAGE = "selftest.html"
 _SURE = (HeldOutVerdict.CONFIRMED, HeldOutVerdict.WEIGHED)
 
 
@@ -61,6 +65,9 @@ def selftest(
     settings: SimulationSettings | None = None,
     *,
     cases: int | None = None,
+    output: str | Path | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
     workers: Workers | None = None,
     progress: Callable[[StudyNews], None] = unheard,
     tell: Tell = log_note,
@@ -72,17 +79,25 @@ def selftest(
     every joint) is put into a simulated robot of its own, on top of those that the config declares;
     the robot plays all motions, and a diagnosis that holds the last one out is judged. At most
     `cases` of them are tried, spread over kinds and joints. `settings`: `usual_settings` by
-    default. `ended` is asked before every case: once it is true, the answer so far is it.
+    default. The folder `output` gets every case as soon as it is done, and a page (`PAGE`); with
+    `resume` cases that are there are not done again. `ended` is asked before every case: once
+    it is true, the answer so far is it.
 
     Raises
     ------
     ConfigError, RobotError, MissingExtraError
         An effect cannot be read or is declared; the config has what no simulated log has; the robot
-        has no mass; MuJoCo is missing.
+        has no mass; MuJoCo is missing; `resume` and `overwrite` are both given, or no folder is.
     FileError
-        The motions are of another robot.
+        The motions are of another robot; cases are in the folder, and neither `resume` nor
+        `overwrite` is requested, or they are of another config; it cannot be written to.
     """
     load_mujoco()
+    if (resume or overwrite) and (output is None or (resume and overwrite)):
+        raise ConfigError(
+            "--resume goes on with the folder of -o, --overwrite replaces it: give one of them, "
+            "with -o FOLDER."
+        )
     case = _testable(problem)
     segments = tuple(load_motions(case, motions, (), tell))
     settings = settings or usual_settings(case, motions)
@@ -93,11 +108,17 @@ def selftest(
         usual = chosen or judging.usual_effects(case.robot, declared, settings.seed)
         chosen = judging.spread(usual, cases or len(usual), settings.seed)
     planted = {it.in_words(names): [it, *judging.beside(it, case.robot, declared)] for it in chosen}
-    power = dict(zip(planted, _predicted(case, segments, chosen, tell), strict=True))
+    foreseen = dict(
+        zip(planted, foreseen_outcomes(case, segments, chosen, settings, tell), strict=True)
+    )
     task = _Task(case, segments, settings, planted)
-    every = [StudyCase(f"case {k}", {"effect": it}, None, it) for k, it in enumerate(planted)]
-    with tempfile.TemporaryDirectory() as folder:
-        done = run_cases(task, every, Path(folder), do_case, workers, report=progress, ended=ended)
+    request = _request(task)
+    every = [
+        StudyCase(f"case {k}", {"effect": it}, None, request + it) for k, it in enumerate(planted)
+    ]
+    with tempfile.TemporaryDirectory() as passing:
+        folder = Path(passing if output is None else output)
+        done = run_cases(task, every, folder, do_case, workers, resume, progress, overwrite, ended)
     if done and done[0].failed and len({each.message for each in done}) == 1:
         raise FileError(f"every case failed: {done[0].message}")
     found = []
@@ -106,9 +127,19 @@ def selftest(
         one = planted[words][0]
         size, (kind, joints) = one.named()[one.number], _name(one, names)
         told: dict[str, Any] = {**record.figures, "message": record.message}
-        told |= {"power": power[words], "seconds": record.seconds}
+        told |= {"seconds": record.seconds, **_in_advance(foreseen[words])}
         found.append(SelftestCase(words, kind, joints, size, **told))
-    return Selftest(case.robot.name, names, tuple(found), len(every))
+    answer = Selftest(case.robot.name, names, tuple(found), len(every))
+    if output is not None:
+        write_text_atomically(Path(output) / PAGE, render(selftest_page(answer)))
+    return answer
+
+
+def _request(task: _Task) -> str:
+    """Digest of what all cases share: the config, robot, motions and how they are played."""
+    parts = [spec_as_yaml(task.case.spec), task.case.robot.fingerprint(), repr(task.settings)]
+    parts += [f"{it.trajectory.duration} {states_of(it)[0].tolist()}" for it in task.motions]
+    return f"{hashlib.sha256(' '.join(parts).encode()).hexdigest()} "
 
 
 @checked("motions")
@@ -130,14 +161,24 @@ def do_case(task: _Task, case: StudyCase, tell: Callable[[str], None]) -> DoneCa
     tell("simulating")
     words = [each.in_words(task.case.robot.joint_names) for each in planted]
     data = simulate(task.case, task.motions, words, task.settings, tell=unheard).dataset
-    found = diagnose(task.case, data, progress=lambda text, done: tell(text), tell=unheard)
-    return DoneCase(_figures(found, planted, task.case), {}, time.perf_counter() - began)
+    try:
+        found = diagnose(task.case, data, progress=lambda text, done: tell(text), tell=unheard)
+        figures = _figures(found, planted, task.case)
+    except ContradictionError as refused:  # that names what was planted is an answer, too
+        own, *others = (_name(each, task.case.robot.joint_names) for each in planted)
+        said = _of_zeros(refused.faults)
+        outcome, _ = judging.judge(own, said, others)
+        if outcome is not judging.Outcome.FOUND:
+            raise
+        figures = {"outcome": str(outcome), "named": _listed([each.name for each in said])}
+    return DoneCase(figures, {}, time.perf_counter() - began)
 
 
 def _figures(found: Diagnosis, planted: Sequence[PlantedEffect], case: Case) -> Figures:
     one, robot = planted[0], case.robot
     own, *others = (_name(each, robot.joint_names) for each in planted)
     said = [_said(found, each) for each in found.effects]
+    said += _of_zeros([(each.kind, each.joints) for each in found.findings])
     absorbed = [(each.kind, each.joints) for each in found.absorbed]
     outcome, wrong = judging.judge(own, said, others, absorbed)
     figures: dict[str, float | int | str | None] = {
@@ -155,6 +196,12 @@ def _figures(found: Diagnosis, planted: Sequence[PlantedEffect], case: Case) -> 
         if (each.effect.kind, each.effect.joints) == own and value is not None:
             figures |= {"found": value.value, "std": value.std}
     return figures
+
+
+def _of_zeros(found: Sequence[Name]) -> list[Said]:
+    """Joints whose zero is found to lie elsewhere have an encoder offset."""
+    joints = [joint for kind, names in found if kind == "zero" for joint in names]
+    return [Said(("encoder_offset", (joint,))) for joint in joints]
 
 
 def _name(planted: PlantedEffect, joints: Sequence[str]) -> Name:
@@ -209,23 +256,10 @@ def _asked(case: Case, effects: Sequence[str], declared: Sequence[Effect]) -> li
     return found
 
 
-def _predicted(
-    case: Case, motions: Sequence[Segment], planted: Sequence[PlantedEffect], tell: Tell
-) -> list[float]:
-    """With what power these motions but the last show each; NaN where that is not known."""
-    try:
-        problem = bare_problem(case)
-        objective, stack = problem.objective(), Stack.empty(problem.columns)
-        for each in motions[: max(1, len(motions) - 1)]:
-            rows = rows_as_recorded(problem, objective, each.coefficients, each.trajectory)
-            stack = stack.with_rows(rows)
-    except ExciteError as error:
-        tell(Note(Level.NOTE, f"no power is predicted: {error}"))
-        return [np.nan for _ in planted]
-    assert problem.prediction is not None
-    alpha, found = case.spec.diagnosis.significance, []
-    for one in planted:
-        kind, joints = _name(one, case.robot.joint_names)
-        shown = power_of(problem.prediction, stack, alpha, kind, abs(float(one.values[0])))
-        found.append(next((it.power for it in shown if it.joints == joints), np.nan))
-    return found
+def _in_advance(found: Foreseen | None) -> dict[str, Any]:
+    """What was predicted of a case, by the names of its fields."""
+    if found is None:
+        return {}
+    said = judging.predicted(found.named, found.apart, found.absorbed)
+    rival = _listed([found.rival] if found.rival else [])
+    return {"power": found.named, "apart": found.apart, "rival": rival, "predicted": said}

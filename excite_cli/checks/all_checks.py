@@ -22,7 +22,7 @@ from excite_cli.checks.trust import but_trusted, is_trusted
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
-from excite_cli.errors import FileError
+from excite_cli.errors import ContradictionError
 from excite_cli.identification.motion_errors import check_motion
 from excite_cli.identification.prepare import PreparedRun, prepare_all
 from excite_cli.identification.processing import Processing, choose_processing
@@ -112,12 +112,16 @@ def without_fault(found: Sequence[CheckResult]) -> Sequence[CheckResult]:
 
     Raises
     ------
-    FileError
+    ContradictionError
         One is.
     """
-    faults = [each.evidence.removesuffix(".") for each in found if each.status == "fault"]
+    faults = [each for each in found if each.status == "fault"]
     if faults:
-        raise FileError(f"the measured data contradict the robot: {'; and '.join(faults)}.")
+        words = "; and ".join(each.evidence.removesuffix(".") for each in faults)
+        raise ContradictionError(
+            f"the measured data contradict the robot: {words}.",
+            [(it.kind, it.joints) for it in faults],
+        )
     return found
 
 

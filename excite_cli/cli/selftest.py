@@ -33,6 +33,16 @@ def selftest(
     cases: int | None = typer.Option(
         None, "--cases", min=1, help="At most so many, spread over kinds and joints."
     ),
+    output: Path | None = options.written(
+        "--output",
+        "-o",
+        metavar="FOLDER",
+        help="Keep every case here as soon as it is done, and a page of all, selftest.html.",
+    ),
+    resume: bool = typer.Option(
+        False, "--resume", help="Skip cases that are in the folder; repeat failed ones."
+    ),
+    overwrite: options.Overwrite = False,
     inertia_error: options.InertiaError = 0.2,
     rate: float | None = typer.Option(
         None, "--rate", help="Samples per second [Hz]. Default: the data's, else 500."
@@ -51,17 +61,18 @@ def selftest(
     Each effect is put into a simulated robot of its own, which plays all motions; a diagnosis of
     the recordings, the last one held out, is then judged. found: it names the effect and joint.
     confounded: it names another effect there, or lists the planted one as an alias or as taken up
-    by inertias. not found: it confirms nothing. wrong: it confirms an effect elsewhere. Ctrl-C ends
-    with the cases done so far. Exit status 1: a case is wrong, or failed.
+    by inertias. not found: it confirms nothing. wrong: it confirms an effect elsewhere. Beside it
+    stands the outcome that was predicted. Ctrl-C ends with the cases done so far. Exit status 1: a
+    case is wrong, or failed.
 
     Examples:
-      excite selftest ur10.yaml ur10.h5 --cases 2
+      excite selftest ur10.yaml ur10.h5 --cases 2 -o tested
       excite selftest ur10.yaml ur10.h5 --torque-noise 0.05 \\
           --effect load_dependent_friction@elbow_joint=0.06
     """
     from excite_cli.api.loading import load_case
+    from excite_cli.api.selftesting import PAGE, selftest_answer, usual_settings
     from excite_cli.api.selftesting import selftest as test_motions
-    from excite_cli.api.selftesting import selftest_answer, usual_settings
     from excite_cli.api.working import working
 
     case = load_case(config, overrides or ())
@@ -86,9 +97,13 @@ def selftest(
             effect or (),
             settings,
             cases=cases,
+            output=output,
+            resume=resume,
+            overwrite=overwrite,
             workers=place,
             progress=lambda it: line(f"{it.done} of {it.total}; {it.told}", it.done, it.total),
             tell=terminal.tell,
             ended=ended,
         )
-    terminal.show(selftest_answer(found))
+    folder = "" if output is None else str(output / PAGE)
+    terminal.show(selftest_answer(found, terminal.verbose, folder))

@@ -42,6 +42,7 @@ _RESUMED = {
     "optimize": "interrupted; what was found so far is in the file: see --resume.",
     "campaign": "interrupted; all that was measured is in the folder: see --resume.",
     "study": "interrupted; every finished case is in the folder: see --resume.",
+    "selftest": "interrupted; every finished case is in the folder, if -o names one: see --resume.",
 }
 _last = signal.SIGINT
 

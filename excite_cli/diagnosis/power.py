@@ -33,8 +33,8 @@ SURE = 0.95
 # χ² of columns that are shifted in time exceeds that of chance by this factor: the median of the
 # placebos of real logs.
 _INFLATION = 1.5
-_TEXTBOOK = (*EVERYDAY_FRICTION, *EVERYDAY)
-_RIDGE = 1e-9  # of what is known of every column
+TEXTBOOK = (*EVERYDAY_FRICTION, *EVERYDAY)
+RIDGE = 1e-9  # of what is known of every column
 # Share of an effect's energy below which the base parameters say it all: rounding.
 _NOTHING = 1e-6
 _ROUNDING = 1e-9
@@ -87,7 +87,7 @@ def power_of(
         effect, scale, share = _about(prediction, at)
         if effect.kind == kind:
             times = size / scale / deviation
-            chance = _chance(times, price(type(effect), significance))
+            chance = probability_named(times, price(type(effect), significance))
             if share * size / scale < (1.0 - _ROUNDING) * rules.SMALLEST:
                 chance = 0.0
             found.append(_record(prediction, effect, size, share * size / scale, chance, times))
@@ -112,11 +112,11 @@ def _deviations(prediction: Prediction, stack: Stack) -> np.ndarray:
     for at, (effect, own) in enumerate(
         zip(extension.effects, extension.columns().slices, strict=True)
     ):
-        if at < prediction.declared or effect.kind in _TEXTBOOK:
+        if at < prediction.declared or effect.kind in TEXTBOOK:
             kept = np.append(kept, rank + np.arange(own.start, own.stop))
     gram = stack.factor.T @ stack.factor
     known = gram + np.diag(np.where(np.arange(len(gram)) < rank, 0.0, 1.0))
-    known[np.diag_indices(rank)] *= 1.0 + _RIDGE
+    known[np.diag_indices(rank)] *= 1.0 + RIDGE
     beside = known[np.ix_(kept, kept)]
     size = np.sqrt(np.maximum(np.diag(beside), 1e-300))
     inverse = np.linalg.pinv(beside / np.outer(size, size), hermitian=True) / np.outer(size, size)
@@ -144,10 +144,10 @@ def _shown(
 def times_named(cost: float, power: float) -> float:
     """Size, in standard deviations, that is named with this power at the price `cost` [χ²]."""
     low, high = 0.0, np.sqrt(cost) - norm.ppf(min(1.0 - power, 0.5)) + 1.0
-    return float(brentq(lambda times: _chance(times, cost) - power, low, high))
+    return float(brentq(lambda times: probability_named(times, cost) - power, low, high))
 
 
-def _chance(times: float, cost: float) -> float:
+def probability_named(times: float, cost: float) -> float:
     """Φ(x − √c) + Φ(−x − √c)."""
     least = np.sqrt(cost)
     return float(norm.sf(least - times) + norm.sf(least + times))

@@ -90,7 +90,7 @@ def kept_case(folder: Path, case: StudyCase) -> CaseRecord | None:
     Raises
     ------
     FileError
-        There is one of another config, robot or log.
+        There is one of another config, robot, log or settings.
     """
     path = folder / f"{case.name}.json"
     if not path.is_file():
@@ -101,8 +101,8 @@ def kept_case(folder: Path, case: StudyCase) -> CaseRecord | None:
         return None
     if record.request != case.request:
         raise FileError(
-            f"--resume: {path} was made with another config, robot or log. Give another folder "
-            "with -o, or delete it."
+            f"--resume: {path} was made with another config, robot, log or settings. Give another "
+            "folder with -o, or delete it."
         )
     whole = all((folder / name).is_file() for name in record.files)
     return record if whole and not record.failed else None

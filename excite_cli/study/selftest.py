@@ -9,7 +9,15 @@ With S the effects that an answer confirms, and p the planted one on its joints,
     not found   else.
 
 The first that holds counts. What was planted beside p, since p refines it, is neither asked for nor
-wrong; nor is what an answer names without confirming it.
+wrong; nor is what an answer names without confirming it. Before the trial, with the probabilities a
+that p is named and confirmed, and b that it is preferred to every other effect, both of
+`diagnosis/foreseen.py`, the outcome is predicted as
+
+    confounded  where inertias take p up;
+    not found   where a ≤ 0.2;
+    confounded  where b ≤ 0.2;
+    found       where a b ≥ 0.8;
+    open        else.
 """
 
 from collections.abc import Collection, Sequence
@@ -26,6 +34,8 @@ from excite_cli.shown.answer import Shown
 from excite_cli.simulation.ground_truth import PlantedEffect, plant, sized
 
 _RARE = 10.0  # `Effect.prior_cost` [χ²] of what one robot in a hundred has
+_UNLIKELY, _LIKELY = 0.2, 0.8  # probabilities that are taken for no and yes
+OPEN = "open"
 _BESIDE = 0  # seed of the sizes of what comes with an effect
 Name = tuple[str, tuple[str, ...]]  # kind, names of joints
 
@@ -70,6 +80,17 @@ def judge(
         return Outcome.FOUND, ()
     close = more or planted in absorbed or any(each.near for each in there)
     return (Outcome.CONFOUNDED if close else Outcome.NOT_FOUND), ()
+
+
+def predicted(named: float, apart: float, absorbed: bool) -> str:
+    """The outcome that these probabilities say (see the module), or that it is open."""
+    if absorbed:
+        return Outcome.CONFOUNDED
+    if named <= _UNLIKELY:
+        return Outcome.NOT_FOUND
+    if apart <= _UNLIKELY:
+        return Outcome.CONFOUNDED
+    return Outcome.FOUND if named * apart >= _LIKELY else OPEN
 
 
 def _same(planted: Name, name: Name) -> bool:
@@ -122,8 +143,10 @@ class SelftestCase:
     """One planted effect and what a diagnosis makes of it, or the `message` that it failed with.
 
     `effect`: as `excite simulate --effect` takes it. `planted`: its size in `unit`; `found` ± `std`
-    in the answer. `power`: predicted probability to name it. `before`, `after`: mean error of the
-    held-out torque, as a share. NaN: not known. `named`: what the answer confirms; `wrong` of it.
+    in the answer. `power`: predicted probability to name it, `apart` to prefer it to the `rival`,
+    the effect that is most like it; `predicted`: the outcome that they say, or `open`. `before`,
+    `after`: mean error of the held-out torque, as a share. NaN: not known. `named`: what the answer
+    confirms; `wrong` of it.
     """
 
     effect: str
@@ -131,6 +154,9 @@ class SelftestCase:
     joints: tuple[str, ...]
     planted: float
     power: float = nan
+    apart: float = nan
+    rival: str = ""
+    predicted: str = ""
     outcome: str = Outcome.FAILED
     unit: str = ""
     found: float = nan

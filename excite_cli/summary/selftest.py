@@ -1,10 +1,19 @@
 """What a self-test found, in a sentence, tables and as data."""
 
-from math import isnan
+from math import isnan, nan
 
 from excite_cli.fields import data_of
-from excite_cli.shown.answer import Answer, Parts, Table, show
-from excite_cli.study.selftest import Outcome, Selftest, SelftestCase
+from excite_cli.shown.answer import (
+    Answer,
+    KeyFigure,
+    Page,
+    Parts,
+    Section,
+    Table,
+    Text,
+    show,
+)
+from excite_cli.study.selftest import OPEN, Outcome, Selftest, SelftestCase
 from excite_cli.summary.cells import figure, percent
 
 _LETTERS = dict(zip(Outcome, "Fc-W!", strict=True))
@@ -12,22 +21,47 @@ _LEGEND = (
     "F found, c confounded with another effect, - not found, W wrong (an effect elsewhere is "
     "confirmed), ! failed"
 )
-_POWER = (
-    "power: predicted probability to name this size, with the noise that planning assumes; before, "
-    "after: held-out error; confirmed: other effects of the answer."
+_COLUMNS = (
+    "power: predicted probability to name it, with the noise that is simulated; predicted: the "
+    "outcome that power and the likeness to other effects say before the trial; size: found, as a "
+    "share of what was planted."
+)
+_MORE = (
+    "like: the effect that is most easily taken for it; before, after: held-out error; confirmed: "
+    "other effects of the answer."
 )
 
 
-def selftest_answer(found: Selftest) -> Answer:
-    """What `excite selftest` answers; status 1 where a case is wrong or failed."""
+def selftest_answer(found: Selftest, verbose: bool = False, folder: str = "") -> Answer:
+    """What `excite selftest` answers; status 1 where a case is wrong or failed.
+
+    With `verbose` also sizes in their units, and errors; `folder`: where all is kept.
+    """
     counts = {str(each): found.count(each) for each in Outcome}
     data = {"robot": found.robot, "asked": found.asked, "outcomes": counts}
-    return Answer(tuple(_parts(found)), data | {"cases": data_of(found.cases)}, found.good)
+    data |= {"cases": data_of(found.cases), "output": folder or None}
+    parts = _parts(found)
+    if found.cases:
+        hint = "(--verbose shows sizes, errors, and what else was confirmed.)"
+        parts += [_details(found), _MORE] if verbose else [hint]
+    return Answer((*parts, *([folder] if folder else [])), data, found.good)
+
+
+def selftest_page(found: Selftest) -> Page:
+    """The answer with all its tables, for a browser."""
+    figures = [KeyFigure(str(each), str(found.count(each))) for each in Outcome]
+    sections = (
+        Section("outcomes", "Outcomes", (_overview(found), _LEGEND)),
+        Section("predicted", "Predicted and seen", (*_failures(found), _cases(found), _COLUMNS)),
+        Section("sizes", "Sizes and errors", (_details(found), _MORE)),
+    )
+    title, answer = f"Self-test of {found.robot}", Text(_in_words(found), "answer")
+    return Page(title, "Planted effects and their diagnoses", tuple(figures), sections, (answer,))
 
 
 def _parts(found: Selftest) -> Parts:
-    """The sentence, outcomes by kind and joint, and every case with its sizes."""
-    tables: Parts = [_overview(found), _LEGEND, _sizes(found), _POWER]
+    """The sentence, outcomes by kind and joint, and what was predicted of every case."""
+    tables: Parts = [_overview(found), _LEGEND, *_failures(found), _cases(found), _COLUMNS]
     return [_in_words(found), *(tables if found.cases else [])]
 
 
@@ -39,12 +73,17 @@ def _in_words(found: Selftest) -> str:
     text += f" ({', '.join(others)})" if others else ""
     left = found.asked - total
     text += f"; {left} not tried, since it was stopped" if left else ""
-    known = [case for case in found.cases if not isnan(case.power)]
-    if known:
-        named = sum(case.outcome == Outcome.FOUND for case in known)
-        text += f". Of {len(known)} with a predicted power, {sum(it.power for it in known):.1f} "
-        text += f"were predicted to be named and {named} are found"
+    told = [case for case in found.cases if case.predicted]
+    if told:
+        right = sum(case.outcome == case.predicted for case in told)
+        text += f". Of {len(told)} predictions {right} came true"
+        unsure = sum(case.predicted == OPEN for case in told)
+        text += f" and {unsure} left it open" if unsure else ""
     return f"{text}."
+
+
+def _failures(found: Selftest) -> list[str]:
+    return [f"{case.effect} failed: {case.message}" for case in found.cases if case.message]
 
 
 def _overview(found: Selftest) -> Table:
@@ -58,29 +97,50 @@ def _overview(found: Selftest) -> Table:
     return Table.of("Outcome by kind and joint", rows.values(), left=("effect",))
 
 
-def _sizes(found: Selftest) -> Table:
-    rows = [_row(case) for case in sorted(found.cases, key=lambda it: (it.kind, it.joints))]
-    words = ("outcome", "confirmed")
-    return Table.of("Planted effects", rows, ("effect", "where", "unit"), words)
+def _cases(found: Selftest) -> Table:
+    rows = [
+        {
+            **_place(case),
+            "power": _or_none(case.power, f"{case.power:.0%}"),
+            "predicted": case.predicted or "-",
+            "seen": case.outcome,
+            "size": _or_none(case.found, f"{case.found / (case.planted or nan):.0%}"),
+        }
+        for case in _in_order(found)
+    ]
+    return Table.of("Planted effects", rows, ("effect", "where", "predicted", "seen"))
 
 
-def _row(case: SelftestCase) -> dict[str, str]:
-    where = "+".join(case.joints)
-    others = [name for name in case.named.split(", ") if name != f"{case.kind}@{where}"]
-    return {
-        "effect": case.kind,
-        "where": where,
-        "outcome": f"{case.outcome} {case.message}".strip(),
-        "planted": figure(case.planted),
-        "found ± std": f"{figure(case.found)} ± {figure(case.std)}"
-        if case.found == case.found
-        else "-",
-        "unit": case.unit,
-        "power": "-" if isnan(case.power) else f"{case.power:.0%}",
-        "before": percent(case.before),
-        "after": percent(case.after),
-        "confirmed": ", ".join(others),
-    }
+def _details(found: Selftest) -> Table:
+    rows = [
+        {
+            **_place(case),
+            "planted": figure(case.planted),
+            "found ± std": _or_none(case.found, f"{figure(case.found)} ± {figure(case.std)}"),
+            "unit": case.unit,
+            "before": percent(case.before),
+            "after": percent(case.after),
+            "like": case.rival,
+            "confirmed": ", ".join(
+                name for name in case.named.split(", ") if name != "@".join(_place(case).values())
+            ),
+        }
+        for case in _in_order(found)
+    ]
+    words = ("like", "confirmed")
+    return Table.of("Sizes and errors", rows, ("effect", "where", "unit"), words)
+
+
+def _or_none(value: float, text: str) -> str:
+    return "-" if isnan(value) else text
+
+
+def _place(case: SelftestCase) -> dict[str, str]:
+    return {"effect": case.kind, "where": "+".join(case.joints)}
+
+
+def _in_order(found: Selftest) -> list[SelftestCase]:
+    return sorted(found.cases, key=lambda case: (case.kind, case.joints))
 
 
 show(Selftest, _in_words, _parts)

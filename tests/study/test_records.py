@@ -72,7 +72,9 @@ def test_a_folder_is_not_written_over(done: Done, tmp_path: Path) -> None:
             with pytest.raises(FileError, match=rf"^\S+{left} exists already.*--resume"):
                 run_study(TASK, cases, tmp_path, done)
         if left == "seed-1.json":
-            with pytest.raises(FileError, match=r"^--resume: .*another config, robot or log"):
+            with pytest.raises(
+                FileError, match=r"^--resume: .*another config, robot, log or settings"
+            ):
                 run_study(TASK, other, tmp_path, done, resume=True)
         (tmp_path / left).unlink()
     run_study(TASK, CASES[:1], tmp_path, done)

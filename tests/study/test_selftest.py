@@ -16,6 +16,7 @@ from excite_cli.study.selftest import (
     SelftestCase,
     beside,
     judge,
+    predicted,
     spread,
     usual_effects,
 )
@@ -63,6 +64,23 @@ def test_what_inertias_take_up_and_what_the_whole_robot_has() -> None:
     load = ("payload", ("slide",))  # joints are no part of its name
     assert judge(load, [Said(("payload", ("elbow",)))])[0] is Outcome.FOUND
     assert judge(("spring", ("slide",)), [Said(("spring", ("elbow",)))])[1]
+
+
+@pytest.mark.parametrize(
+    ("named", "apart", "absorbed", "outcome"),
+    [
+        (1.0, 1.0, True, "confounded"),
+        (0.2, 0.0, False, "not found"),
+        (0.21, 0.2, False, "confounded"),
+        (0.9, 0.9, False, "found"),
+        (0.9, 0.8, False, "open"),
+        (0.5, 1.0, False, "open"),
+    ],
+)
+def test_the_outcome_that_is_predicted(
+    named: float, apart: float, absorbed: bool, outcome: str
+) -> None:
+    assert predicted(named, apart, absorbed) == outcome
 
 
 def test_usual_effects_are_those_of_many_robots(robot: Robot) -> None:

@@ -1,0 +1,99 @@
+"""What motions are expected to make of planted effects, with the noise of a simulation."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from excite_cli.api.inspecting import bare_problem
+from excite_cli.api.loading import Case
+from excite_cli.config.trajectory_spec import TaskSpec
+from excite_cli.diagnosis.expectation import rows_as_recorded
+from excite_cli.diagnosis.foreseen import Foreseen, foresee
+from excite_cli.dynamics.regressor import Regressor, standard_parameters
+from excite_cli.effects.catalogue import declared_effects
+from excite_cli.errors import ExciteError
+from excite_cli.excitation.effect_columns import why_not_planned
+from excite_cli.excitation.objective import Stack
+from excite_cli.robot.model import Array
+from excite_cli.shown.note import Level, Note, Tell
+from excite_cli.simulation.ground_truth import PlantedEffect
+from excite_cli.simulation.settings import SimulationSettings
+from excite_cli.study.selftest import beside, usual_effects
+from excite_cli.trajectory.fade import Segment
+
+_COUNTED = 1e-4  # noise of a torque that has none, as a share: positions are counted
+_LEAST = 1e-6  # of the largest torque, where inertias make none
+_INSTANTS = 500
+_BLOCK = 0.5  # s, of a held-out recording
+
+
+def foreseen_outcomes(
+    case: Case,
+    motions: Sequence[Segment],
+    planted: Sequence[PlantedEffect],
+    settings: SimulationSettings,
+    tell: Tell,
+) -> list[Foreseen | None]:
+    """What these motions but the last are expected to make of each; None where that is not known.
+
+    Rows are means over m samples, with the noise ν RMS τ, τ the torque of the URDF's inertias. With
+    s the noise of a sample as a share, and c its correlation from sample to sample,
+
+        ν² = s²/m ((1 + c)/(1 − c) − 2 c (1 − c^m) / (m (1 − c)²)).
+    """
+    declared = declared_effects(case.spec.effects, replace(case.robot, rows=case.robot.moved))
+    usual = usual_effects(case.robot, declared if case.spec.effects else (), settings.seed)
+    possible = list({it.effect.place: it.effect for it in (*usual, *planted)}.values())
+    kept, level = motions[: max(1, len(motions) - 1)], _noise_of_means(settings)
+    weights = 1.0 / (level * _usual_torque(case, kept))
+    by_row = dict(zip(case.robot.row_names, weights.tolist(), strict=True))
+    criterion = case.spec.criterion.model_copy(update={"row_weights": by_row})
+    spec = case.spec.model_copy(update={"criterion": criterion})
+    try:
+        problem = bare_problem(replace(case, spec=spec), possible)
+        objective, stack = problem.objective(), Stack.empty(problem.columns)
+        recorded = [
+            rows_as_recorded(problem, objective, each.coefficients, each.trajectory)
+            for each in motions
+        ]
+        for rows in recorded[: len(kept)]:
+            stack = stack.with_rows(rows)
+    except ExciteError as error:
+        tell(Note(Level.NOTE, f"no outcome is predicted: {error}"))
+        return [None for _ in planted]
+    size = int(_BLOCK * TaskSpec().rate) * len(case.robot.rows)
+    blocks = recorded[-1][: len(recorded[-1]) // size * size].reshape(-1, size, problem.columns)
+    prediction, alpha = problem.prediction, case.spec.diagnosis.significance
+    assert prediction is not None
+
+    def found(one: PlantedEffect) -> Foreseen | None:
+        if why_not_planned(one.effect, case.robot):
+            return None
+        # Friction of several terms is confirmed as one.
+        line = one.effect.friction and beside(one, case.robot, declared)
+        held = None if line else blocks
+        return foresee(prediction, stack, held, alpha, one.effect, one.values, level)
+
+    return [found(each) for each in planted]
+
+
+def _noise_of_means(settings: SimulationSettings) -> float:
+    """ν of `foreseen_outcomes`; where a mean has less than one sample, so much larger."""
+    c, m = settings.noise_correlation, max(1.0, settings.rate / TaskSpec().rate)
+    of_one = (1.0 + c) / (1.0 - c) - 2.0 * c * (1.0 - c**m) / (m * (1.0 - c) ** 2)
+    fewer = max(1.0, TaskSpec().rate / settings.rate)
+    return max(settings.torque_noise, _COUNTED) * float(np.sqrt(of_one / m * fewer))
+
+
+def _usual_torque(case: Case, motions: Sequence[Segment]) -> Array:
+    """RMS (R,) of the torque of every row that the URDF's inertias make on these motions."""
+    y = [Regressor(case.robot).evaluate(*states_of(each)) for each in motions]
+    tau = np.concatenate(y) @ standard_parameters(case.robot)
+    rms = np.sqrt(np.mean(np.square(tau), axis=0))
+    return np.asarray(np.maximum(rms, _LEAST * rms.max()))
+
+
+def states_of(motion: Segment) -> tuple[Array, Array, Array]:
+    """q, v, a, each (N, n), at instants spread evenly over the motion."""
+    return motion.at(np.linspace(0.0, motion.trajectory.duration, _INSTANTS))

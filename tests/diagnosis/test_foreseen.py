@@ -1,0 +1,137 @@
+"""What a diagnosis is expected to make of an effect: named, told apart, taken up by inertias."""
+
+import numpy as np
+import pytest
+
+from excite_cli.diagnosis import rules
+from excite_cli.diagnosis.foreseen import foresee
+from excite_cli.diagnosis.power import power_of, price, sizes_shown
+from excite_cli.effects.base import Effect
+from excite_cli.effects.catalogue import kind_named
+from excite_cli.excitation.objective import Stack
+from excite_cli.excitation.problem import Problem
+from tests.excitation.smoke import drawn, smoke, stacked
+from tests.excitation.smoke import prediction_of as of
+
+NOISE = 0.02
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    return smoke("criterion.kind=predicted_torque")
+
+
+def effect_of(problem: Problem, kind: str, joint: str) -> Effect:
+    place = (problem.robot.joint_names.index(joint),)
+    effects = of(problem).extension.effects
+    return next(each for each in effects if each.kind == kind and each.joints == place)
+
+
+def test_it_is_named_as_often_as_its_power_says(problem: Problem) -> None:
+    stack, kind = stacked(problem, 1), "load_dependent_friction"
+    effect = effect_of(problem, kind, "elbow")
+    shown = sizes_shown(of(problem), stack, 0.01, power=0.8)
+    size = next(it.size for it in shown if (it.kind, it.joints) == (kind, ("elbow",)))
+    for times in (0.3, 1.0, 1.5):
+        found = foresee(of(problem), stack, None, 0.01, effect, np.array([times * size]), NOISE)
+        same = power_of(of(problem), stack, 0.01, kind, times * size)
+        own = next(it.power for it in same if it.joints == ("elbow",))
+        assert found.named == pytest.approx(own)
+
+
+def test_what_is_small_is_not_named_however_sure(problem: Problem) -> None:
+    stack, effect = stacked(problem, 1), effect_of(problem, "load_dependent_friction", "elbow")
+    values = np.array([0.02])
+    assert foresee(of(problem), stack, None, 0.01, effect, values, NOISE).named > 0.9
+    assert (
+        foresee(of(problem), stack, None, 0.01, effect, values, 1e-3 * rules.SMALLEST).named == 0.0
+    )
+
+
+def test_the_likelier_of_two_is_preferred_as_often_as_told(problem: Problem) -> None:
+    """Drawn data of a robot that has the one: which of the two saves more χ² beyond its price?"""
+    prediction, rng = of(problem), np.random.default_rng(5)
+    block = problem.objective().block(drawn(problem, 0.3, 1))
+    stack = Stack.empty(problem.columns).with_rows(block)
+    effect, values = effect_of(problem, "load_dependent_friction", "elbow"), np.array([1e-3])
+    for _ in range(30):
+        found = foresee(prediction, stack, None, 0.01, effect, values, 1.0)
+        if found.apart > 0.8:
+            break
+        values = 1.3 * values
+    assert 0.6 < found.apart < 0.95
+    assert found.rival is not None
+    rival = effect_of(problem, found.rival[0], *found.rival[1])
+    p, d = (
+        prediction.first_columns[prediction.extension.effects.index(e)] for e in (effect, rival)
+    )
+    textbook = ("viscous_friction", "coulomb_friction", "torque_offset", "armature")
+    beside = [*range(prediction.rank)]
+    beside += [
+        int(first)
+        for first, each in zip(prediction.first_columns, prediction.extension.effects, strict=True)
+        if each.kind in textbook and each != effect
+    ]
+    prior = np.eye(len(beside))[prediction.rank :]
+    fixed = np.vstack([block[:, beside], prior])
+    both = [np.append(block[:, each], np.zeros(len(prior))) for each in (p, d)]
+    q, _ = np.linalg.qr(fixed)
+    seen = [each - q @ (q.T @ each) for each in both]
+    size = values[0] / prediction.extension.scales[p - prediction.rank]
+    dearer = price(type(rival), 0.01) - price(type(effect), 0.01)
+    preferred = 0
+    for _ in range(1000):
+        rows = size * seen[0] + rng.normal(size=len(fixed))
+        saved = [(each @ rows) ** 2 / (each @ each) for each in seen]
+        preferred += saved[0] + dearer > saved[1]
+    assert preferred / 1000 == pytest.approx(found.apart, abs=0.05)
+
+
+def test_inertias_take_up_what_no_motion_separates_from_them(problem: Problem) -> None:
+    effect = effect_of(problem, "armature", "shoulder_yaw")
+    found = foresee(of(problem), stacked(problem, 1), None, 0.01, effect, np.array([1.0]), NOISE)
+    assert found.absorbed
+    assert found.named == 0.0
+    other = effect_of(problem, "armature", "elbow")
+    assert not foresee(
+        of(problem), stacked(problem, 1), None, 0.01, other, np.array([1.0]), NOISE
+    ).absorbed
+
+
+def test_what_shows_on_no_motion_is_not_named(problem: Problem) -> None:
+    effect = kind_named("encoder_offset")((0,))  # gravity does not turn about it
+    assert effect not in of(problem).extension.effects
+    assert (
+        foresee(of(problem), stacked(problem, 1), None, 0.01, effect, np.ones(1), NOISE).named
+        == 0.0
+    )
+
+
+def test_what_shows_in_few_held_out_blocks_is_not_confirmed(problem: Problem) -> None:
+    """The same energy in twelve blocks and in two: of these a draw may have none."""
+    block = problem.objective().block(drawn(problem, 0.3, 1))
+    stack, effect = stacked(problem, 1), effect_of(problem, "load_dependent_friction", "elbow")
+    whole = block.reshape(12, -1, block.shape[1])
+    few = np.zeros_like(whole)
+    few[:2] = np.sqrt(6.0) * whole[:2]
+    of_whole, of_few, of_none = (
+        foresee(of(problem), stack, each, 0.01, effect, np.array([0.2]), NOISE).named
+        for each in (whole, few, 0.0 * whole)
+    )
+    assert of_whole > 0.95
+    assert of_few < 0.6
+    assert of_none < 0.05
+
+
+def test_what_the_textbook_has_is_confirmed_from_two_deviations_on(problem: Problem) -> None:
+    """Whatever it costs, but for what is too small to stay in the model."""
+    effect = effect_of(problem, "viscous_friction", "elbow")
+    stack = stacked(problem, 1)
+    powers = power_of(of(problem), stack, 0.01, "viscous_friction", 1.0)
+    two = 2.0 / next(it.times for it in powers if it.joints == ("elbow",))
+    large, small = (
+        foresee(of(problem), stack, None, 0.01, effect, np.array([two]), noise)
+        for noise in (1.0, 1e-2 * rules.MATTERS)
+    )
+    assert large.named == pytest.approx(0.5, abs=0.01)
+    assert small.named < 0.1
