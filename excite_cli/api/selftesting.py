@@ -12,13 +12,13 @@ import numpy as np
 
 from excite_cli.api.arguments import checked
 from excite_cli.api.diagnosing import diagnose
-from excite_cli.api.foreseeing import foreseen_outcomes, states_of
 from excite_cli.api.loading import Case, load_data, measured_case
 from excite_cli.api.motions import Motions, is_motion, load_motions
+from excite_cli.api.outcome_prediction import predicted_outcomes, states_of
 from excite_cli.api.simulating import configured_drive, simulate
 from excite_cli.atomic import write_text_atomically
 from excite_cli.config.load_spec import spec_as_yaml
-from excite_cli.diagnosis.foreseen import Foreseen
+from excite_cli.diagnosis.predicted_outcome import PredictedOutcome
 from excite_cli.diagnosis.records import Diagnosis, NamedEffect
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.dynamics.regressor import standard_parameters
@@ -108,8 +108,8 @@ def selftest(
         usual = chosen or judging.usual_effects(case.robot, declared, settings.seed)
         chosen = judging.spread(usual, cases or len(usual), settings.seed)
     planted = {it.in_words(names): [it, *judging.beside(it, case.robot, declared)] for it in chosen}
-    foreseen = dict(
-        zip(planted, foreseen_outcomes(case, segments, chosen, settings, tell), strict=True)
+    expected = dict(
+        zip(planted, predicted_outcomes(case, segments, chosen, settings, tell), strict=True)
     )
     task = _Task(case, segments, settings, planted)
     request = _request(task)
@@ -127,7 +127,7 @@ def selftest(
         one = planted[words][0]
         size, (kind, joints) = one.named()[one.number], _name(one, names)
         told: dict[str, Any] = {**record.figures, "message": record.message}
-        told |= {"seconds": record.seconds, **_in_advance(foreseen[words])}
+        told |= {"seconds": record.seconds, **_in_advance(expected[words])}
         found.append(SelftestCase(words, kind, joints, size, **told))
     answer = Selftest(case.robot.name, names, tuple(found), len(every))
     if output is not None:
@@ -256,7 +256,7 @@ def _asked(case: Case, effects: Sequence[str], declared: Sequence[Effect]) -> li
     return found
 
 
-def _in_advance(found: Foreseen | None) -> dict[str, Any]:
+def _in_advance(found: PredictedOutcome | None) -> dict[str, Any]:
     """What was predicted of a case, by the names of its fields."""
     if found is None:
         return {}

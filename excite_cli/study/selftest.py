@@ -11,7 +11,7 @@ With S the effects that an answer confirms, and p the planted one on its joints,
 The first that holds counts. What was planted beside p, since p refines it, is neither asked for nor
 wrong; nor is what an answer names without confirming it. Before the trial, with the probabilities a
 that p is named and confirmed, and b that it is preferred to every other effect, both of
-`diagnosis/foreseen.py`, the outcome is predicted as
+`diagnosis/predicted_outcome.py`, the outcome is predicted as
 
     confounded  where inertias take p up;
     not found   where a ≤ 0.2;

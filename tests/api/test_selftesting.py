@@ -18,9 +18,9 @@ from excite_cli import (
     selftest,
     simulate,
 )
-from excite_cli.api import foreseeing, selftesting
-from excite_cli.api.foreseeing import foreseen_outcomes
+from excite_cli.api import outcome_prediction, selftesting
 from excite_cli.api.motions import load_motions
+from excite_cli.api.outcome_prediction import predicted_outcomes
 from excite_cli.api.selftesting import selftest_answer, usual_settings
 from excite_cli.errors import ContradictionError
 from excite_cli.shown.note import unheard
@@ -86,7 +86,9 @@ def test_the_noise_of_means_is_that_of_drawn_means(correlation: float, rate: flo
     size = round(rate / 20.0)
     drawn = _noise((200_000, 1), correlation, np.random.default_rng(1))
     means = drawn[: len(drawn) // size * size].reshape(-1, size).mean(axis=1)
-    assert foreseeing._noise_of_means(settings) == pytest.approx(0.05 * means.std(), rel=0.03)
+    assert outcome_prediction._noise_of_means(settings) == pytest.approx(
+        0.05 * means.std(), rel=0.03
+    )
 
 
 def test_more_noise_is_less_power(result: Result) -> None:
@@ -96,7 +98,7 @@ def test_more_noise_is_less_power(result: Result) -> None:
         settings = SimulationSettings(1, rate, noise, correlation)
         (one,) = parse_planted(effect, case.robot, {})
         motions = load_motions(case, result, (), unheard)
-        (found,) = foreseen_outcomes(case, motions, [one], settings, unheard)
+        (found,) = predicted_outcomes(case, motions, [one], settings, unheard)
         assert found is not None
         powers.append(found.named)
     assert powers[0] > 0.9 > powers[1] > powers[2]

@@ -9,7 +9,7 @@ from excite_cli.api.inspecting import bare_problem
 from excite_cli.api.loading import Case
 from excite_cli.config.trajectory_spec import TaskSpec
 from excite_cli.diagnosis.expectation import rows_as_recorded
-from excite_cli.diagnosis.foreseen import Foreseen, foresee
+from excite_cli.diagnosis.predicted_outcome import PredictedOutcome, predict_outcome
 from excite_cli.dynamics.regressor import Regressor, standard_parameters
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.errors import ExciteError
@@ -28,13 +28,13 @@ _INSTANTS = 500
 _BLOCK = 0.5  # s, of a held-out recording
 
 
-def foreseen_outcomes(
+def predicted_outcomes(
     case: Case,
     motions: Sequence[Segment],
     planted: Sequence[PlantedEffect],
     settings: SimulationSettings,
     tell: Tell,
-) -> list[Foreseen | None]:
+) -> list[PredictedOutcome | None]:
     """What these motions but the last are expected to make of each; None where that is not known.
 
     Rows are means over m samples, with the noise ν RMS τ, τ the torque of the URDF's inertias. With
@@ -67,19 +67,19 @@ def foreseen_outcomes(
     prediction, alpha = problem.prediction, case.spec.diagnosis.significance
     assert prediction is not None
 
-    def found(one: PlantedEffect) -> Foreseen | None:
+    def found(one: PlantedEffect) -> PredictedOutcome | None:
         if why_not_planned(one.effect, case.robot):
             return None
         # Friction of several terms is confirmed as one.
         line = one.effect.friction and beside(one, case.robot, declared)
         held = None if line else blocks
-        return foresee(prediction, stack, held, alpha, one.effect, one.values, level)
+        return predict_outcome(prediction, stack, held, alpha, one.effect, one.values, level)
 
     return [found(each) for each in planted]
 
 
 def _noise_of_means(settings: SimulationSettings) -> float:
-    """ν of `foreseen_outcomes`; where a mean has less than one sample, so much larger."""
+    """ν of `predicted_outcomes`; where a mean has less than one sample, so much larger."""
     c, m = settings.noise_correlation, max(1.0, settings.rate / TaskSpec().rate)
     of_one = (1.0 + c) / (1.0 - c) - 2.0 * c * (1.0 - c**m) / (m * (1.0 - c) ** 2)
     fewer = max(1.0, TaskSpec().rate / settings.rate)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from excite_cli.diagnosis import rules
-from excite_cli.diagnosis.foreseen import foresee
 from excite_cli.diagnosis.power import power_of, price, sizes_shown
+from excite_cli.diagnosis.predicted_outcome import predict_outcome
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.excitation.objective import Stack
@@ -33,7 +33,9 @@ def test_it_is_named_as_often_as_its_power_says(problem: Problem) -> None:
     shown = sizes_shown(of(problem), stack, 0.01, power=0.8)
     size = next(it.size for it in shown if (it.kind, it.joints) == (kind, ("elbow",)))
     for times in (0.3, 1.0, 1.5):
-        found = foresee(of(problem), stack, None, 0.01, effect, np.array([times * size]), NOISE)
+        found = predict_outcome(
+            of(problem), stack, None, 0.01, effect, np.array([times * size]), NOISE
+        )
         same = power_of(of(problem), stack, 0.01, kind, times * size)
         own = next(it.power for it in same if it.joints == ("elbow",))
         assert found.named == pytest.approx(own)
@@ -42,9 +44,10 @@ def test_it_is_named_as_often_as_its_power_says(problem: Problem) -> None:
 def test_what_is_small_is_not_named_however_sure(problem: Problem) -> None:
     stack, effect = stacked(problem, 1), effect_of(problem, "load_dependent_friction", "elbow")
     values = np.array([0.02])
-    assert foresee(of(problem), stack, None, 0.01, effect, values, NOISE).named > 0.9
+    assert predict_outcome(of(problem), stack, None, 0.01, effect, values, NOISE).named > 0.9
     assert (
-        foresee(of(problem), stack, None, 0.01, effect, values, 1e-3 * rules.SMALLEST).named == 0.0
+        predict_outcome(of(problem), stack, None, 0.01, effect, values, 1e-3 * rules.SMALLEST).named
+        == 0.0
     )
 
 
@@ -55,7 +58,7 @@ def test_the_likelier_of_two_is_preferred_as_often_as_told(problem: Problem) -> 
     stack = Stack.empty(problem.columns).with_rows(block)
     effect, values = effect_of(problem, "load_dependent_friction", "elbow"), np.array([1e-3])
     for _ in range(30):
-        found = foresee(prediction, stack, None, 0.01, effect, values, 1.0)
+        found = predict_outcome(prediction, stack, None, 0.01, effect, values, 1.0)
         if found.apart > 0.8:
             break
         values = 1.3 * values
@@ -89,11 +92,13 @@ def test_the_likelier_of_two_is_preferred_as_often_as_told(problem: Problem) -> 
 
 def test_inertias_take_up_what_no_motion_separates_from_them(problem: Problem) -> None:
     effect = effect_of(problem, "armature", "shoulder_yaw")
-    found = foresee(of(problem), stacked(problem, 1), None, 0.01, effect, np.array([1.0]), NOISE)
+    found = predict_outcome(
+        of(problem), stacked(problem, 1), None, 0.01, effect, np.array([1.0]), NOISE
+    )
     assert found.absorbed
     assert found.named == 0.0
     other = effect_of(problem, "armature", "elbow")
-    assert not foresee(
+    assert not predict_outcome(
         of(problem), stacked(problem, 1), None, 0.01, other, np.array([1.0]), NOISE
     ).absorbed
 
@@ -102,7 +107,9 @@ def test_what_shows_on_no_motion_is_not_named(problem: Problem) -> None:
     effect = kind_named("encoder_offset")((0,))  # gravity does not turn about it
     assert effect not in of(problem).extension.effects
     assert (
-        foresee(of(problem), stacked(problem, 1), None, 0.01, effect, np.ones(1), NOISE).named
+        predict_outcome(
+            of(problem), stacked(problem, 1), None, 0.01, effect, np.ones(1), NOISE
+        ).named
         == 0.0
     )
 
@@ -115,7 +122,7 @@ def test_what_shows_in_few_held_out_blocks_is_not_confirmed(problem: Problem) ->
     few = np.zeros_like(whole)
     few[:2] = np.sqrt(6.0) * whole[:2]
     of_whole, of_few, of_none = (
-        foresee(of(problem), stack, each, 0.01, effect, np.array([0.2]), NOISE).named
+        predict_outcome(of(problem), stack, each, 0.01, effect, np.array([0.2]), NOISE).named
         for each in (whole, few, 0.0 * whole)
     )
     assert of_whole > 0.95
@@ -130,7 +137,7 @@ def test_what_the_textbook_has_is_confirmed_from_two_deviations_on(problem: Prob
     powers = power_of(of(problem), stack, 0.01, "viscous_friction", 1.0)
     two = 2.0 / next(it.times for it in powers if it.joints == ("elbow",))
     large, small = (
-        foresee(of(problem), stack, None, 0.01, effect, np.array([two]), noise)
+        predict_outcome(of(problem), stack, None, 0.01, effect, np.array([two]), noise)
         for noise in (1.0, 1e-2 * rules.MATTERS)
     )
     assert large.named == pytest.approx(0.5, abs=0.01)

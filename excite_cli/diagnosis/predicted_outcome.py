@@ -43,7 +43,7 @@ _NOTHING = 1e-12  # of an energy: rounding
 
 
 @dataclass(frozen=True)
-class Foreseen:
+class PredictedOutcome:
     """Probabilities that an effect is `named` and confirmed, and preferred to a `rival` (`apart`).
 
     `absorbed`: inertias take it up; `rival`: kind and names of joints.
@@ -55,7 +55,7 @@ class Foreseen:
     rival: tuple[str, tuple[str, ...]] | None = None
 
 
-def foresee(
+def predict_outcome(
     prediction: Prediction,
     stack: Stack,
     blocks: Array | None,
@@ -63,7 +63,7 @@ def foresee(
     effect: Effect,
     values: Array,
     noise: float,
-) -> Foreseen:
+) -> PredictedOutcome:
     """For `effect` with its parameters `values` in their units.
 
     `blocks` (B, m, c): rows of the held-out recording, cut into blocks; None where others are sure
@@ -71,7 +71,7 @@ def foresee(
     prediction's effects shows on no motion.
     """
     if effect not in prediction.extension.effects:
-        return Foreseen(0.0)
+        return PredictedOutcome(0.0)
     effects, rank = prediction.extension.effects, prediction.rank
     own, gram = effects.index(effect), stack.factor.T @ stack.factor
     slices = prediction.extension.columns().slices
@@ -91,13 +91,13 @@ def foresee(
 
     bare, _ = left_by(there)
     if not effect.refines and bare[p[0], p[0]] <= ABSORBED * gram[p[0], p[0]]:
-        return Foreseen(0.0, absorbed=True)
+        return PredictedOutcome(0.0, absorbed=True)
     left, residual = left_by(beside)
     energy, cost = float(z @ left[np.ix_(p, p)] @ z), price(type(effect), significance)
     samples = max(1.0, stack.rows / len(prediction.usual))
     share = noise * np.sqrt(max(energy, 0.0) / samples)
     if not share >= rules.SMALLEST:
-        return Foreseen(0.0)
+        return PredictedOutcome(0.0)
     always = effect.kind in TEXTBOOK and share >= rules.MATTERS
     named = probability_named(float(np.sqrt(energy)), _DOUBT if always else cost)
     if blocks is not None:
@@ -112,10 +112,10 @@ def foresee(
         dearer = price(type(effects[at]), significance) - cost
         preferred.append((float(norm.cdf(0.5 * (alone + dearer) / np.sqrt(alone))), at))
     if always or not preferred:
-        return Foreseen(named)
+        return PredictedOutcome(named)
     apart, at = min(preferred)
     names = prediction.extension.robot.joint_names
-    return Foreseen(
+    return PredictedOutcome(
         named, apart, False, (effects[at].kind, tuple(names[j] for j in effects[at].joints))
     )
 
