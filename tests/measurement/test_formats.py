@@ -81,6 +81,31 @@ def test_plotjuggler(log: Path) -> None:
     assert_same(read(log))
 
 
+def of_libfranka(*, words: str = ", ") -> str:
+    """As `franka::logToCSV` writes it: time in whole ms, what it commanded beside what it read."""
+    fields = ("q", "q_d", "dq", "dq_d", "tau_J", "tau_ext_hat_filtered")
+    commands = {"q_d": 2, "dq_d": 2, "O_T_EE_d": 16, "O_dP_EE_d": 6, "tau_J_d": 2}
+    groups = [[f"state.{name}[{i}]" for i in (0, 1)] for name in fields]
+    groups += [[f"cmd.{name}[{i}]" for i in range(n)] for name, n in commands.items()]
+    head = f"time{words}success_rate{words}" + ",".join(words.join(each) for each in groups)
+    rest = np.full((len(T), 2), 7.0)
+    speed = np.gradient(Q, T, axis=0)
+    sent = np.full((len(T), sum(commands.values())), 9.0)
+    _, *rows = table(
+        PLAIN, 1e3 * T + 5e4, np.ones(len(T)), Q, rest, speed, rest, TAU, rest, sent
+    ).splitlines()
+    return "\n".join([head, *rows]) + "\n"
+
+
+@pytest.mark.parametrize("words", [", ", ","])  # its older and its newer heads
+@pytest.mark.parametrize("declared", [{}, {"preset": "franka"}])
+def test_libfranka(log: Path, declared: dict[str, str], words: str) -> None:
+    log.write_text(of_libfranka(words=words), encoding="utf-8")
+    assert_same(read(log, **declared))
+    commanded = read(log, channels={"tau": "cmd.tau_J_d"})
+    np.testing.assert_allclose(commanded.tau, 9.0)
+
+
 def save_7_3(path: Path, held: dict[str, Any]) -> None:
     """As MATLAB's `save(…, '-v7.3')`: after a header of 512 bytes, HDF5 of transposed arrays."""
 
