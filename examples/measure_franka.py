@@ -13,6 +13,7 @@ import csv
 import gc
 import signal
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -95,7 +96,8 @@ def play(robot: Robot, joints, t, states, options: argparse.Namespace) -> list[n
                 return rows
     except Exception:
         ignore_signals()
-        robot.stop()
+        with suppress(Exception):  # where it is out of reach, it stops by itself
+            robot.stop()
         raise
 
 

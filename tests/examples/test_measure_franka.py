@@ -66,6 +66,7 @@ def test_a_motion_is_played_recorded_and_identified(
         ),
         ({"off": 0.2}, "the robot is 0.20 rad off the start", None),
         ({"reflex": 3.0}, "aborted by reflex", "stopped"),
+        ({"lost": 3.0}, "UDP receive: Timeout", "stopped"),
         ({"jam": 3.0}, "rad off the motion", "stopped"),
     ],
 )

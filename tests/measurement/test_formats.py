@@ -81,29 +81,27 @@ def test_plotjuggler(log: Path) -> None:
     assert_same(read(log))
 
 
-def of_libfranka(*, words: str = ", ") -> str:
-    """As `franka::logToCSV` writes it: time in whole ms, what it commanded beside what it read."""
-    fields = ("q", "q_d", "dq", "dq_d", "tau_J", "tau_ext_hat_filtered")
+def of_libfranka(space: str) -> str:
+    """As `franka::logToCSV` writes it: whole ms, six digits, and what it commanded beside."""
+    states = ("q", "q_d", "dq", "dq_d", "tau_J", "tau_ext_hat_filtered")
     commands = {"q_d": 2, "dq_d": 2, "O_T_EE_d": 16, "O_dP_EE_d": 6, "tau_J_d": 2}
-    groups = [[f"state.{name}[{i}]" for i in (0, 1)] for name in fields]
-    groups += [[f"cmd.{name}[{i}]" for i in range(n)] for name, n in commands.items()]
-    head = f"time{words}success_rate{words}" + ",".join(words.join(each) for each in groups)
-    rest = np.full((len(T), 2), 7.0)
-    speed = np.gradient(Q, T, axis=0)
-    sent = np.full((len(T), sum(commands.values())), 9.0)
-    _, *rows = table(
-        PLAIN, 1e3 * T + 5e4, np.ones(len(T)), Q, rest, speed, rest, TAU, rest, sent
-    ).splitlines()
-    return "\n".join([head, *rows]) + "\n"
+    sizes = {f"state.{name}": 2 for name in states} | {f"cmd.{k}": n for k, n in commands.items()}
+    groups = [f",{space}".join(f"{k}[{i}]" for i in range(n)) for k, n in sizes.items()]
+    lines = [f"time,{space}success_rate,{space}{','.join(groups)}"]
+    other, speed, sent = np.full_like(Q, 7.0), np.gradient(Q, T, axis=0), np.full((len(T), 28), 9.0)
+    for t, row in zip(T, np.hstack([Q, other, speed, other, TAU, other, sent]), strict=True):
+        lines.append(f"{50_000 + round(1e3 * t)},1,{','.join(f'{x:.6g}' for x in row)}")
+    return "\n".join(lines) + "\n"
 
 
-@pytest.mark.parametrize("words", [", ", ","])  # its older and its newer heads
+@pytest.mark.parametrize("space", [" ", ""])  # its older heads, and its newer ones
 @pytest.mark.parametrize("declared", [{}, {"preset": "franka"}])
-def test_libfranka(log: Path, declared: dict[str, str], words: str) -> None:
-    log.write_text(of_libfranka(words=words), encoding="utf-8")
-    assert_same(read(log, **declared))
-    commanded = read(log, channels={"tau": "cmd.tau_J_d"})
-    np.testing.assert_allclose(commanded.tau, 9.0)
+def test_libfranka(log: Path, declared: dict[str, str], space: str) -> None:
+    log.write_text(of_libfranka(space), encoding="utf-8")
+    run = read(log, **declared)
+    for one, other in zip((run.t - run.t[0], run.q, run.tau), (T, Q, TAU), strict=True):
+        np.testing.assert_allclose(one, other, rtol=5e-6, atol=1e-12)
+    np.testing.assert_allclose(read(log, channels={"tau": "cmd.tau_J_d"}).tau, 9.0)
 
 
 def save_7_3(path: Path, held: dict[str, Any]) -> None:

@@ -1,9 +1,9 @@
 """A stand-in of pylibfranka 0.21: what `measure_franka.py` uses of it, and an arm that follows.
 
 `STAND_IN` in the environment is JSON: urdf, joints, start, and faults: `refuse` (no connection),
-`mode` and `errors` at first, `reflex` and `jam` at an instant [s]; `saw` is where it writes how a
-control ended. Time is the robot's own: nothing waits. As the robot does, it takes no set points
-whose acceleration jumps, and none that begin elsewhere than at `q_d`.
+`mode` and `errors` at first, `reflex`, `jam` and `lost` (network) at an instant [s]; `saw` is where
+it writes how a control ended. Time is the robot's own: nothing waits. As the robot does, it takes
+no set points whose acceleration jumps, and none that begin elsewhere than at `q_d`.
 """
 
 import json
@@ -55,6 +55,8 @@ class ActiveControlBase:
     def readOnce(self) -> tuple[SimpleNamespace, Duration]:
         if self.now > GIVEN.get("reflex", np.inf):
             raise RuntimeError("libfranka: Move command aborted: motion aborted by reflex!")
+        if self.now > GIVEN.get("lost", np.inf):
+            raise RuntimeError("libfranka: UDP receive: Timeout")
         passed = Duration(0.0 if self.first else PERIOD)
         self.first, self.now = False, self.now + passed
         time.sleep(GIVEN.get("pause", 0.0))
@@ -86,6 +88,8 @@ class Robot:
 
     def stop(self) -> None:
         Path(GIVEN["saw"]).write_text("stopped")
+        if "lost" in GIVEN:
+            raise RuntimeError("libfranka: TCP send: Connection reset")
 
 
 def state_of(arm: TrackingArm, now: float) -> SimpleNamespace:
