@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 USER_STAMP := $(VENV)/.installed-for-use
 
 .PHONY: install run plan loop test test-all suite sanitize lint lock floors dist release-check audit docs bench peers trust battery
-.PHONY: campaigns loops robots real scoreboard gallery clean
+.PHONY: campaigns loops robots real scoreboard gallery identified clean
 
 install: $(USER_STAMP)   ## the program alone, with figures, simulation and the view
 
@@ -85,6 +85,9 @@ real: $(STAMP)           ## logs of six real robots, into the table of docs/resu
 
 gallery: $(STAMP)        ## the same logs, a page with pictures for each robot (ten minutes)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m docs.make_gallery
+
+identified: $(STAMP)     ## the models of these robots and their page (four minutes)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m docs.make_identified
 
 battery: $(STAMP)        ## the diagnosis on MuJoCo robots with undeclared effects (about 20 minutes)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks.battery --cases 130 --seed 5310

@@ -84,7 +84,7 @@ def written(robot: str, kept: Path, target: Path) -> list[tuple[str, ...]]:
         answers.append(Diagnosed(log.words, command, every[0], rows[-1][-1], pictures))
     case = load_case(DATA.parent / config)
     data = load_data(case, DATA / robot / logs[0].file, tell=lambda note: None)
-    text = page(_facts(robot), data, answers)
+    text = page(facts(robot), data, answers)
     (target / f"{robot}.md").write_text(text, encoding="utf-8")
     return rows
 
@@ -135,7 +135,7 @@ def _found(log: Log, options: Sequence[str], path: Path) -> Diagnosis:
     return read_diagnosis(path)
 
 
-def _facts(robot: str) -> Mapping[str, str]:
+def facts(robot: str) -> Mapping[str, str]:
     """What the log's authors are told to have recorded."""
     with h5py.File(DATA / robot / f"{robot}.h5") as file:
         return {name: str(value) for name, value in file.attrs.items()}

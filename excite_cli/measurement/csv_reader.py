@@ -26,12 +26,14 @@ from excite_cli.measurement.reader import (
 # - `rostopic echo -p`: `%time, field.header.stamp, field.name0, …, field.position0, …`, in ns; the
 #   names of the joints stand in every row.
 # - PlotJuggler: `__time, /joint_states/elbow/position, …`, in s; or `/joint_states/position[0]`.
+# - libfranka's `logToCSV`: `time, success_rate, state.q[0], …, state.tau_J[0], …`, in ms.
 # - Units in headers, as `q_elbow [deg]` or `t (ms)`: values are converted to s, rad, m and N·m.
 
 _FIELDS = {"position": "q", "velocity": "dq", "effort": "tau"}
 _ECHOED = re.compile(r"field\.(position|velocity|effort)(\d+)$")
 _PLOTTED = re.compile(r"/?(?:.*/)?([^/]+)/(position|velocity|effort)$")
 _PLOTTED_NUMBER = re.compile(r"/?.*/(position|velocity|effort)\[(\d+)\]$")
+_LOGGED = re.compile(r"state\.(q|dq|tau_J)\[(\d+)\]$")
 _UNIT = re.compile(r"^(.*\S)\s*[\[(]\s*([^\[\]()]*[^\[\]()\d\s][^\[\]()]*)\s*[\])]$")
 # In s, rad, rad/s, m, m/s, N·m and N; those that say nothing of a unit of ours are left alone.
 _UNITS = {
@@ -47,7 +49,7 @@ def in_our_names(
     columns: Mapping[str, Array], words: Mapping[str, str]
 ) -> tuple[dict[str, Array], list[Finding]]:
     """Columns (T,) by our names, and what was converted; `words`: columns that hold one word."""
-    found = _echoed(columns, words) or _plotted(columns) or dict(columns)
+    found = _echoed(columns, words) or _plotted(columns) or _logged(columns) or dict(columns)
     return _converted(found)
 
 
@@ -78,6 +80,14 @@ def _plotted(columns: Mapping[str, Array]) -> dict[str, Array]:
         elif name != "__time":
             found[name] = values
     return found
+
+
+def _logged(columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Those of libfranka's `logToCSV`; none where it is not its table."""
+    if not {"time", "state.q[0]"} <= columns.keys():
+        return {}
+    found = {"t [ms]" if name == "time" else name: values for name, values in columns.items()}
+    return {_LOGGED.sub(r"\1_\2", name): values for name, values in found.items()}
 
 
 def _converted(columns: Mapping[str, Array]) -> tuple[dict[str, Array], list[Finding]]:
@@ -149,17 +159,18 @@ def run_of_table(path: Path, table: NamedColumns, wanted: ReadOptions) -> RawRun
 
 
 def _by_fields(columns: Mapping[str, Array], wanted: ReadOptions) -> ReadOptions:
-    """With the names of `JointState` for channels of which nothing is said and nothing is there.
+    """With the names of `JointState`, or of libfranka, for channels of which nothing is there.
 
     Of joints of the robot, or numbered: a gripper's position is none.
     """
     robot = {*wanted.joints, *wanted.names}
     found: dict[str, str | None] = {}
-    for channel, field in FIELDS.items():
-        if channel in wanted.channels or _joints(columns, channel):
-            continue
-        joints = _joints(columns, field).values()
-        if any(joint in robot or joint.isdigit() for joint in joints):
+
+    def is_there(word: str) -> bool:
+        return any(j in robot or j.isdigit() for j in _joints(columns, word).values())
+
+    for channel, field in (*FIELDS.items(), ("tau", "tau_J")):
+        if not (channel in wanted.channels or is_there(channel)) and is_there(field):
             found[channel] = field
     return replace(wanted, channels={**found, **wanted.channels}) if found else wanted
 

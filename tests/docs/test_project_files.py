@@ -20,7 +20,7 @@ CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 PINNED = ROOT / "requirements" / "ci.txt"
 # Packages that messages tell to install and that are none of the program's own needs.
-OTHERS = {"robot_descriptions", "ur_rtde"}
+OTHERS = {"robot_descriptions", "ur_rtde", "pylibfranka"}
 # Modules that a workflow installs itself or that are of the tools of development.
 TOOLS = {"pip", "build", "cibuildwheel", "pytest", "venv"}
 

@@ -5,6 +5,7 @@ from subprocess import Popen
 import numpy as np
 import pytest
 
+from excite_cli.robot.description import example_robots
 from tests.cli.conftest import cache
 from tests.cli.program import ROOT, Program
 from tests.examples.tracking_arm import COULOMB, VISCOUS
@@ -97,6 +98,11 @@ def ur10(tmp_path_factory: pytest.TempPathFactory, cache: Path) -> Planned:
 @pytest.fixture(scope="session")
 def smoke_arm(tmp_path_factory: pytest.TempPathFactory, cache: Path) -> Planned:
     return _planned(tmp_path_factory.mktemp("arm"), cache, ROOT / "data" / "smoke_arm.urdf")
+
+
+@pytest.fixture(scope="session")
+def panda(tmp_path_factory: pytest.TempPathFactory, cache: Path) -> Planned:
+    return _planned(tmp_path_factory.mktemp("panda"), cache, example_robots()["panda"])
 
 
 @pytest.fixture

@@ -81,6 +81,29 @@ def test_plotjuggler(log: Path) -> None:
     assert_same(read(log))
 
 
+def of_libfranka(space: str) -> str:
+    """As `franka::logToCSV` writes it: whole ms, six digits, and what it commanded beside."""
+    states = ("q", "q_d", "dq", "dq_d", "tau_J", "tau_ext_hat_filtered")
+    commands = {"q_d": 2, "dq_d": 2, "O_T_EE_d": 16, "O_dP_EE_d": 6, "tau_J_d": 2}
+    sizes = {f"state.{name}": 2 for name in states} | {f"cmd.{k}": n for k, n in commands.items()}
+    groups = [f",{space}".join(f"{k}[{i}]" for i in range(n)) for k, n in sizes.items()]
+    lines = [f"time,{space}success_rate,{space}{','.join(groups)}"]
+    other, speed, sent = np.full_like(Q, 7.0), np.gradient(Q, T, axis=0), np.full((len(T), 28), 9.0)
+    for t, row in zip(T, np.hstack([Q, other, speed, other, TAU, other, sent]), strict=True):
+        lines.append(f"{50_000 + round(1e3 * t)},1,{','.join(f'{x:.6g}' for x in row)}")
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize("space", [" ", ""])  # its older heads, and its newer ones
+@pytest.mark.parametrize("declared", [{}, {"preset": "franka"}])
+def test_libfranka(log: Path, declared: dict[str, str], space: str) -> None:
+    log.write_text(of_libfranka(space), encoding="utf-8")
+    run = read(log, **declared)
+    for one, other in zip((run.t - run.t[0], run.q, run.tau), (T, Q, TAU), strict=True):
+        np.testing.assert_allclose(one, other, rtol=5e-6, atol=1e-12)
+    np.testing.assert_allclose(read(log, channels={"tau": "cmd.tau_J_d"}).tau, 9.0)
+
+
 def save_7_3(path: Path, held: dict[str, Any]) -> None:
     """As MATLAB's `save(…, '-v7.3')`: after a header of 512 bytes, HDF5 of transposed arrays."""
 
