@@ -3,7 +3,7 @@
 from math import isfinite
 
 from excite_cli.fields import data_of
-from excite_cli.scoring.forecast import Forecast, JointForecast
+from excite_cli.scoring.forecast import Forecast
 from excite_cli.shown.answer import Answer, Parts, Table, show
 from excite_cli.summary.cells import percent
 
@@ -19,26 +19,24 @@ def forecast_answer(found: Forecast) -> Answer:
 
 def forecast_parts(found: Forecast) -> Parts:
     """The sentence, and a row for each joint."""
-    names = ("joint", "torque RMS", "expected error", "share", "outside the model's data")
-    rows = tuple(
-        (
-            name,
-            f"{each.torque:.3g} {unit}",
-            f"{each.error:.3g} {unit}" if isfinite(each.error) else "not known",
-            percent(each.share) if isfinite(each.share) else "",
-            _outside(each),
-        )
+    rows = [
+        {
+            "joint": name,
+            "torque RMS": f"{each.torque:.3g} {unit}",
+            "expected error": f"{each.error:.3g} {unit}" if isfinite(each.error) else "not known",
+            "share": percent(each.share) if isfinite(each.share) else "",
+            "speed": _times(each.faster, each.fastest),
+            "load": _times(each.heavier, each.heaviest),
+            "position": _times(each.farther, each.farthest),
+        }
         for (name, each), unit in zip(found.joints.items(), found.torque_units, strict=True)
-    )
-    left = ("joint", "outside the model's data")
-    note = (
-        "where the joint moves. expected error: noise, parameters, what the model lacks, as one "
-        "standard deviation"
-    )
-    return [
-        _sentence(found),
-        Table("", names, rows, left=left, words=left[1:], note=note),
     ]
+    note = (
+        "Where the joint moves. expected error: noise, parameters, and what the model lacks, as "
+        "one standard deviation; speed, load, position: how many times those of the model's own "
+        "data at most, where beyond them (positions from the middle of the own ones)."
+    )
+    return [_sentence(found), Table.of("", rows, left=("joint",)), note]
 
 
 def _sentence(found: Forecast) -> str:
@@ -51,19 +49,8 @@ def _sentence(found: Forecast) -> str:
     return f"{told} Beyond the positions, speeds or loads of the model's data: {named}."
 
 
-def _outside(joint: JointForecast) -> str:
-    if not joint.outside:
-        return ""
-    told = [
-        f"{what}, up to {most:.1f} times"
-        for what, share, most in (
-            ("faster", joint.faster, joint.fastest),
-            ("more load", joint.heavier, joint.heaviest),
-            ("other positions", joint.farther, joint.farthest),
-        )
-        if share > 0.0
-    ]
-    return ", ".join(told)
+def _times(share: float, most: float) -> str:
+    return f"{most:.1f} x" if share > 0.0 else ""
 
 
 show(Forecast, _sentence, forecast_parts)
