@@ -64,7 +64,7 @@ def test_page_says_how_every_kind_is_judged() -> None:
 def test_how_to_names_every_trait_with_its_default() -> None:
     page = own_package.PAGE.read_text(encoding="utf-8")
     follows = {"joints", "runs", "kind", "active", "exclusive_with", "torque"}
-    follows |= {"is_change", "is_searched", "asked_for", "builds_on"}
+    follows |= {"is_change", "is_friction", "is_searched", "asked_for", "builds_on"}
     follows |= {"signal_to_error", "why_impossible", "report_on"}
     stated = {name for name in vars(Effect) if not name.startswith("_")} - follows
     assert sorted(name for name in stated if name not in page) == []
