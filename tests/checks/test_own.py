@@ -13,7 +13,6 @@ import pytest
 from excite_cli.checks.all_checks import look, rows_in_order
 from excite_cli.checks.catalogue import CHECKS
 from excite_cli.config.load_spec import load_spec
-from excite_cli.errors import ExciteWarning
 from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing
 from tests.effects import own_package
@@ -55,19 +54,3 @@ def test_the_check_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         assert [each.evidence[: len("the supply sagged to 41 V in")] for each in found] == told
         row = next(e for e in rows_in_order(found, True, SPEC) if e.name == "voltage of the supply")
         assert row.status == ("fault" if told else "ok")
-
-
-@pytest.mark.parametrize(
-    ("code", "why"),
-    [
-        ("Supply = 3", "it is not a subclass of Check"),
-        ("from excite_cli.checks.base import Check\nclass Supply(Check): name = 'x'", "lacks look"),
-        ("import nothing_of_that_name", "cannot be loaded"),
-    ],
-)
-def test_one_that_cannot_be_used_is_set_aside(
-    code: str, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    install(tmp_path, code, monkeypatch)
-    with pytest.warns(ExciteWarning, match=f"check 'supply'.*set aside.*{why}"):
-        assert not CHECKS.foreign

@@ -31,19 +31,12 @@ UNUSABLE = {
     "missing": ("", "Missing", "cannot be loaded"),
     "raises": ("raise RuntimeError('no licence')", "Mine", "RuntimeError: no licence"),
     "exits": ("import sys; sys.exit(3)", "Mine", "SystemExit: 3"),
-    "not one": ("Mine = 3", "Mine", "is not a subclass of Effect"),
-    "abstract": (
-        "from excite_cli.effects.base import Effect\nclass Mine(Effect):\n    kind = 'mine'",
-        "Mine",
-        "it lacks columns",
-    ),
     "nameless": (GOOD.replace('"mine"', '""'), "Mine", "does not state its kind, title"),
     "of no kind": (
         GOOD + "    refines = ('coulom_friction',)\n",
         "Mine",
         "`refines` names 'coulom_friction', which does not exist. Did you mean 'coulomb_friction'",
     ),
-    "taken": ("from excite_cli.effects.spring import Spring as Mine", "Mine", "another effect"),
 }
 FAILING = {
     "raises": "raise ZeroDivisionError('of mine')",
