@@ -40,9 +40,8 @@ def declare(
 ) -> None:
     """A package whose entry point `mine` leads to `Mine` of a module with this code."""
     module = f"of_{registry.group.partition('.')[2]}"
-    own_package.install(folder, code, {"mine": f"{module}:Mine"}, module, registry.group)
-    monkeypatch.syspath_prepend(folder)
-    monkeypatch.delitem(sys.modules, module, raising=False)
+    names = {"mine": f"{module}:Mine"}
+    own_package.install(folder, code, names, monkeypatch, module, registry.group)
     forget(registry)
 
 

@@ -21,11 +21,6 @@ UNIT = {"imu": {"link": "unit"}}
 
 
 @pytest.fixture(scope="module")
-def robot(tmp_path_factory: pytest.TempPathFactory) -> Robot:
-    return stander(tmp_path_factory.mktemp("urdf"))
-
-
-@pytest.fixture(scope="module")
 def log() -> Swayed:
     return swayed(samples=1600, step=STEP)
 

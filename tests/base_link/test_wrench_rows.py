@@ -13,14 +13,9 @@ from excite_cli.errors import ConfigError, FileError
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.robot.base_joints import BASE_JOINTS
 from excite_cli.robot.model import Robot
-from tests.base_link.stander import FEET, Array, Swayed, stander, swayed
+from tests.base_link.stander import FEET, Array, Swayed, swayed
 
 ON_FEET = [{"channel": foot, "link": foot} for foot in FEET]
-
-
-@pytest.fixture(scope="module")
-def robot(tmp_path_factory: pytest.TempPathFactory) -> Robot:
-    return stander(tmp_path_factory.mktemp("urdf"))
 
 
 @pytest.fixture(scope="module")

@@ -1,9 +1,7 @@
 """A check of one's own, as docs/how-to/check.md writes it."""
 
 import re
-import sys
 import tomllib
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,11 +11,10 @@ import pytest
 from excite_cli.checks.all_checks import look, rows_in_order
 from excite_cli.checks.catalogue import CHECKS
 from excite_cli.config.load_spec import load_spec
-from excite_cli.errors import ExciteWarning
 from excite_cli.identification.prepare import prepare_all
 from excite_cli.identification.processing import choose_processing
 from tests.effects import own_package
-from tests.registries import forget
+from tests.registries import read_anew
 from tests.simulation.arms import arm, played
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "check.md"
@@ -29,23 +26,12 @@ def block(language: str) -> str:
     return str(found)
 
 
-@pytest.fixture(autouse=True)
-def _read_anew() -> Iterator[None]:
-    forget(CHECKS)
-    yield
-    forget(CHECKS)
-
-
-def install(folder: Path, code: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What an installer leaves of the package of the page."""
-    points = tomllib.loads(block("toml"))["project"]["entry-points"][CHECKS.group]
-    own_package.install(folder, code, points, "my_checks", CHECKS.group)
-    monkeypatch.syspath_prepend(folder)
-    monkeypatch.delitem(sys.modules, "my_checks", raising=False)
+_read_anew = read_anew(CHECKS)
 
 
 def test_the_check_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    install(tmp_path, block("python"), monkeypatch)
+    points = tomllib.loads(block("toml"))["project"]["entry-points"][CHECKS.group]
+    own_package.install(tmp_path, block("python"), points, monkeypatch, "my_checks", CHECKS.group)
     robot = arm()
     (run,) = played(robot, torque_noise=0.01).dataset.runs
     processing = choose_processing([run], SPEC.measurement.filter)
@@ -55,19 +41,3 @@ def test_the_check_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         assert [each.evidence[: len("the supply sagged to 41 V in")] for each in found] == told
         row = next(e for e in rows_in_order(found, True, SPEC) if e.name == "voltage of the supply")
         assert row.status == ("fault" if told else "ok")
-
-
-@pytest.mark.parametrize(
-    ("code", "why"),
-    [
-        ("Supply = 3", "it is not a subclass of Check"),
-        ("from excite_cli.checks.base import Check\nclass Supply(Check): name = 'x'", "lacks look"),
-        ("import nothing_of_that_name", "cannot be loaded"),
-    ],
-)
-def test_one_that_cannot_be_used_is_set_aside(
-    code: str, why: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    install(tmp_path, code, monkeypatch)
-    with pytest.warns(ExciteWarning, match=f"check 'supply'.*set aside.*{why}"):
-        assert not CHECKS.foreign

@@ -13,25 +13,19 @@ import yaml
 from excite_cli.api.loading import Case, load_data
 from excite_cli.checks.all_checks import check_dataset
 from excite_cli.config.load_spec import load_spec
-from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import FileError
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.measurement.hdf5_writer import write_dataset
-from excite_cli.robot.model import Robot, build_robot
-from excite_cli.simulation.ground_truth import plant
-from excite_cli.simulation.planned_motion import PlannedMotion
+from excite_cli.measurement.missing_values import rows_of
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
-from excite_cli.trajectory.fourier import FourierTrajectory
 from tests.cli.program import ROOT, SMOKE, Program
+from tests.diagnosis.simulated_arm import ELBOW, ROBOT, planted
+from tests.measurement.recordings import write_csv
+from tests.simulation.arms import about_posture
 
 NAMES = ("shoulder_yaw", "shoulder_pitch", "elbow", "wrist_roll", "slide")
 Change = Callable[[Any], Any]
-
-
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return build_robot(load_spec(SMOKE).robot, SMOKE.parent)
 
 
 @pytest.fixture(scope="module")
@@ -46,18 +40,11 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def recorded(robot: Robot) -> Dataset:
+def recorded() -> Dataset:
     """Two runs of an arm whose elbow has dry friction that nobody declared."""
-    friction = plant(kind_named("coulomb_friction"), (2,), 3.0)
-    trajectory = FourierTrajectory(3, 2 * np.pi / 6)
-    motions = []
-    for seed in (1, 2):
-        draw = np.random.default_rng(seed).normal(size=(trajectory.n_coefficients, robot.n))
-        coefficients = 0.15 * draw * np.array([1.0, 1.0, 1.0, 1.0, 0.1])
-        coefficients[-1] = robot.posture
-        motions.append(PlannedMotion(f"run_{seed}", trajectory, coefficients))
+    motions = [about_posture(ROBOT, f"run_{seed}", seed, 6.0) for seed in (1, 2)]
     settings = SimulationSettings(rate=200.0, lead_in=0.3)
-    return simulate(robot, motions, settings, [friction]).dataset
+    return simulate(ROBOT, motions, settings, [planted("coulomb_friction", ELBOW, 3.0)]).dataset
 
 
 def damaged(recorded: Dataset, changes: dict[str, Change]) -> Dataset:
@@ -135,15 +122,15 @@ def test_the_program_ends_with_the_message(
 
 @pytest.mark.parametrize("case", CASES)
 def test_every_mistake_has_its_message(
-    case: str, recorded: Dataset, config: Path, robot: Robot, tmp_path: Path
+    case: str, recorded: Dataset, config: Path, tmp_path: Path
 ) -> None:
     """The way `diagnose` and `identify` take from the file, without a process for each case."""
     changes, words = CASES[case]
     write_dataset(tmp_path / "data.h5", damaged(recorded, changes), {})
     spec = load_spec(config)
     with pytest.raises(FileError) as told:  # noqa: PT012 - either may be the one that tells
-        data = load_data(Case(spec, config.parent, robot), tmp_path / "data.h5")
-        check_dataset(robot, data, spec)
+        data = load_data(Case(spec, config.parent, ROBOT), tmp_path / "data.h5")
+        check_dataset(ROBOT, data, spec)
     assert all(word in str(told.value) for word in words), told.value
 
 
@@ -154,7 +141,7 @@ def test_names_in_another_order_are_told_by_diagnose_and_identify(
     order = [0, 2, 1, 3, 4]
     names = tuple(recorded.joint_names[j] for j in order)
     write_dataset(excite.folder / "data.h5", replace(recorded, joint_names=names), {})
-    write_csv(excite.folder / "data.csv", recorded.runs[0], names)
+    write_csv(excite.folder / "data.csv", replace(recorded.runs[0], dq=None), names)
     for command, file in (("diagnose", "data.csv"), ("identify", "data.h5")):
         said = excite.refused(command, config, file)
         assert "columns of shoulder_pitch and elbow are swapped" in said
@@ -162,24 +149,15 @@ def test_names_in_another_order_are_told_by_diagnose_and_identify(
         assert "measurement.trust: [order of columns]" in said
 
 
-def write_csv(path: Path, run: Run, names: tuple[str, ...], keep: np.ndarray | None = None) -> None:
-    header = ["t", *(f"{c}_{name}" for c in ("q", "tau") for name in names)]
-    table = np.column_stack([run.t, run.q, run.tau])
-    np.savetxt(
-        path, table if keep is None else table[keep], delimiter=",", header=",".join(header),
-        comments="",
-    )  # fmt: skip
-
-
 def test_a_gap_and_missing_values_are_warned_of_and_the_diagnosis_is_right(
     recorded: Dataset, config: Path, excite: Program
 ) -> None:
-    first, second = recorded.runs
+    first, second = (replace(run, dq=None, extra={}) for run in recorded.runs)
     broken = first.tau.copy()
     broken[400:420, 1] = np.nan
-    gap = (second.t < 2.0) | (second.t > 2.3)
+    second = rows_of(second, (second.t < 2.0) | (second.t > 2.3))
     write_csv(excite.folder / "nan.csv", replace(first, tau=broken), recorded.joint_names)
-    write_csv(excite.folder / "gap.csv", second, recorded.joint_names, gap)
+    write_csv(excite.folder / "gap.csv", second, recorded.joint_names)
     run = excite.good("diagnose", config, "nan.csv", "gap.csv", "--json")
     said = " ".join(run.stderr.split())
     assert "warning (gap" in said

@@ -92,7 +92,7 @@ def test_gradients_where_joints_follow_others(parts: tuple, uncertain: bool) -> 
     spec = _all(DiscSpec(radius=0.3), collision=True).model_copy(
         update={"contact": ground, "surroundings": around}
     )
-    found = build_constraints(spec, robot, _known(robot, uncertain))
+    found = build_constraints(spec, robot, known(robot, uncertain))
     assert {"joint_torque", "balance", "contact", "self_collision", "surroundings"} <= {
         constraint.name for constraint in found
     }
@@ -112,7 +112,7 @@ def with_motors() -> Robot:
     return coupled_robot(HAND, transmissions=(wrist,))
 
 
-def _known(robot: Robot, uncertain: bool) -> InertiaUncertainty | None:
+def known(robot: Robot, uncertain: bool) -> InertiaUncertainty | None:
     if not uncertain:
         return None
     return inertia_uncertainty(UncertaintySpec(mass=0.1), robot, find_base_parameters(robot))
@@ -124,7 +124,7 @@ def test_motors_that_drive_several_joints_are_bounded(uncertain: bool) -> None:
     spec = ConstraintsSpec(
         joint_limits=JointLimitsSpec(acceleration=8.0, scale=0.5), torque=TorqueSpec(scale=0.5)
     )
-    found = {each.name: each for each in build_constraints(spec, robot, _known(robot, uncertain))}
+    found = {each.name: each for each in build_constraints(spec, robot, known(robot, uncertain))}
     of_motors = ("motor_position", "motor_velocity", "motor_acceleration", "motor_jerk",
                  "motor_torque")  # fmt: skip
     assert set(of_motors) < set(found)
@@ -172,7 +172,7 @@ def test_bounds_of_motors_between_instants_hold_at_instants(uncertain: bool) -> 
     intervals = intervals_of(family, 0.02)
     motion = EnclosedMotion(robot, enclosed_states(family, coefficients, intervals))
     spec = ConstraintsSpec(joint_limits=JointLimitsSpec(), torque=TorqueSpec())
-    found = build_constraints(spec, robot, _known(robot, uncertain))
+    found = build_constraints(spec, robot, known(robot, uncertain))
     for constraint in (each for each in found if each.name.startswith("motor")):
         least = constraint.least(motion)
         assert least is not None

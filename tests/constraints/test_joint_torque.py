@@ -5,16 +5,13 @@ import pytest
 
 from excite_cli.config.constraints_spec import ConstraintsSpec, TorqueSpec
 from excite_cli.config.robot_spec import JointLimits
-from excite_cli.config.spec import UncertaintySpec
 from excite_cli.constraints.catalogue import build_constraints
-from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.dynamics.regressor import InverseDynamics
-from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty, inertia_uncertainty
 from excite_cli.proof.enclosed_motion import EnclosedMotion, enclosed_states, intervals_of
 from excite_cli.robot.model import Robot
 from excite_cli.trajectory.fourier import FourierTrajectory
-from tests.constraints.test_gradients import check_gradients
+from tests.constraints.test_gradients import check_gradients, known
 from tests.robot.coupled_robots import HAND, coupled_robot
 
 # Not concave: torque falls steeply, then slowly, as in field weakening.
@@ -24,12 +21,6 @@ TORQUE = ConstraintsSpec(joint_limits=None, torque=TorqueSpec(scale=0.5))
 
 def robot() -> Robot:
     return coupled_robot(HAND, limits={"wrist": JointLimits(effort_by_speed=POINTS)})
-
-
-def known(robot: Robot, uncertain: bool) -> InertiaUncertainty | None:
-    if not uncertain:
-        return None
-    return inertia_uncertainty(UncertaintySpec(mass=0.1), robot, find_base_parameters(robot))
 
 
 def test_braking_has_the_torque_of_no_speed() -> None:

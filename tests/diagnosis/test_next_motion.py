@@ -15,7 +15,7 @@ from excite_cli.errors import FileError
 from excite_cli.excitation.admissible import worst_margins
 from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.result import Result
-from excite_cli.excitation.run import continue_run, new_result
+from excite_cli.excitation.run import new_result
 from tests.diagnosis.synthetic_diagnosis import (
     CONFIG,
     NOISE,
@@ -25,20 +25,16 @@ from tests.diagnosis.synthetic_diagnosis import (
     smoke_spec,
     viscous,
 )
+from tests.excitation.smoke import planned
 
 COULOMB = EffectRecord("coulomb_friction", ("elbow",), {}, (1.0,))
 ALL = ("shoulder_yaw", "shoulder_pitch", "elbow", "wrist_roll", "slide")
 SPRING = EffectRecord("spring", ("shoulder_pitch",), {}, (3.0, 0.2))
 
 
-def run(planned: NextMotion) -> Result:
-    return continue_run(
-        planned.problem,
-        new_result(planned.model, [("diagnosis.h5", planned.prior)], {}),
-        lambda index: lambda progress: None,
-        lambda step, current: None,
-        planned.model,
-    )
+def run(following: NextMotion) -> Result:
+    begin = new_result(following.model, [("diagnosis.h5", following.prior)], {})
+    return planned(following.problem, begin, model=following.model)
 
 
 @pytest.fixture(scope="module")

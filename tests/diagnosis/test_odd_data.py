@@ -23,10 +23,9 @@ from tests.cli.program import SMOKE
 pytest.importorskip("mujoco")
 
 from excite_cli.simulation.ground_truth import plant
-from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
-from excite_cli.trajectory.fourier import FourierTrajectory
+from tests.simulation.arms import about_posture
 
 KINDS = "diagnosis.kinds=[viscous_friction, coulomb_friction, contact, backlash]"
 
@@ -40,13 +39,7 @@ def case(*overrides: str) -> Case:
 def recorded(joints: str = "all", rate: float = 200.0) -> Dataset:
     """Three runs of the smoke arm, or of its elbow alone, with 3 N·m of dry friction there."""
     robot = case(*([] if joints == "all" else [f"robot.joints=[{joints}]"])).robot
-    trajectory = FourierTrajectory(3, 2 * np.pi / 5)
-    motions = []
-    for k in (1, 2, 3):
-        drawn = np.random.default_rng(k).normal(size=(trajectory.n_coefficients, robot.n))
-        coefficients = np.where(robot.sliding, 0.015, 0.15) * drawn
-        coefficients[-1] = robot.posture
-        motions.append(PlannedMotion(f"motion_{k}", trajectory, coefficients))
+    motions = [about_posture(robot, f"motion_{k}", k, 5.0) for k in (1, 2, 3)]
     friction = plant(kind_named("coulomb_friction"), (robot.joint_names.index("elbow"),), 3.0)
     data = simulate(robot, motions, SimulationSettings(rate=rate, lead_in=0.3), [friction]).dataset
     return each(data, lambda run: replace(run, extra={}, dq=None))

@@ -3,7 +3,6 @@
 It is the one that docs/how-to/effect.md writes, installed as its readers do.
 """
 
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
@@ -28,10 +27,8 @@ Named = dict[str, tuple[float, ...]]
 def own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[type[Effect]]:
     """The class, once its package is installed."""
     folder = tmp_path_factory.mktemp("package")
-    own_package.install(folder, own_package.code(), own_package.points())
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(folder)
-        patch.delitem(sys.modules, own_package.MODULE, raising=False)
+        own_package.install(folder, own_package.code(), own_package.points(), patch)
         forget(EFFECTS)
         yield kind_named(OWN)
     forget(EFFECTS)

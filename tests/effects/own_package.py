@@ -1,8 +1,11 @@
 """The effect that docs/how-to/effect.md writes, and what an installer leaves of its package."""
 
 import re
+import sys
 import tomllib
 from pathlib import Path
+
+import pytest
 
 from excite_cli.effects.catalogue import EFFECTS
 
@@ -33,12 +36,19 @@ def points() -> dict[str, str]:
 
 
 def install(
-    folder: Path, text: str, names: dict[str, str], module: str = MODULE, group: str = EFFECTS.group
+    folder: Path,
+    text: str,
+    names: dict[str, str],
+    patch: pytest.MonkeyPatch,
+    module: str = MODULE,
+    group: str = EFFECTS.group,
 ) -> None:
-    """What an installer leaves of a package with one module."""
+    """What an installer leaves of a package with one module; it can be imported."""
     (folder / f"{module}.py").write_text(text, encoding="utf-8")
     info = folder / f"{module}-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {module}\nVersion: 1.0\n")
     lines = [f"[{group}]", *(f"{name} = {value}" for name, value in names.items())]
     (info / "entry_points.txt").write_text("\n".join(lines) + "\n")
+    patch.syspath_prepend(folder)
+    patch.delitem(sys.modules, module, raising=False)

@@ -1,7 +1,6 @@
 """The page on effects says what the catalogue has, and its example works as it stands."""
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,18 +14,14 @@ from excite_cli.excitation.gradient_check import central_differences, relative_e
 from excite_cli.robot.model import Array
 from tests.effects import own_package
 from tests.effects.motions import signals_at, signals_of, states
-from tests.registries import forget
+from tests.registries import read_anew
 from tests.robot.random_robots import random_robot
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "effects.md").read_text(encoding="utf-8")
 
 
-@pytest.fixture(autouse=True)
-def _catalogue_read_anew() -> Iterator[None]:
-    forget(EFFECTS)
-    yield
-    forget(EFFECTS)
+_read_anew = read_anew(EFFECTS)
 
 
 @pytest.mark.parametrize("name", list(catalogue()))
@@ -77,9 +72,7 @@ def test_example_is_a_kind_of_the_catalogue_once_installed(
 ) -> None:
     columns = own_package.blocks("python")[0]
     assert len([line for line in columns.splitlines() if line.strip()]) <= 30
-    own_package.install(tmp_path, columns, own_package.points())
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(__import__("sys").modules, own_package.MODULE, raising=False)
+    own_package.install(tmp_path, columns, own_package.points(), monkeypatch)
     robot = random_robot(4, joints=3, branches=False, prismatic=False)
     spec = EffectSpec(kind="roller_friction", joints=("joint_2",))
     (effect,) = declared_effects((spec,), robot)

@@ -1,7 +1,5 @@
 """Effects of other packages: what cannot be used is named and set aside, and all else works."""
 
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -10,7 +8,7 @@ import excite_cli as api
 from excite_cli.effects.catalogue import EFFECTS, catalogue, kind_named
 from excite_cli.errors import ConfigError, ExciteWarning
 from tests.effects import own_package
-from tests.registries import forget
+from tests.registries import read_anew
 from tests.trust.conftest import SMOKE
 from tests.trust.in_process import excite
 
@@ -31,19 +29,12 @@ UNUSABLE = {
     "missing": ("", "Missing", "cannot be loaded"),
     "raises": ("raise RuntimeError('no licence')", "Mine", "RuntimeError: no licence"),
     "exits": ("import sys; sys.exit(3)", "Mine", "SystemExit: 3"),
-    "not one": ("Mine = 3", "Mine", "is not a subclass of Effect"),
-    "abstract": (
-        "from excite_cli.effects.base import Effect\nclass Mine(Effect):\n    kind = 'mine'",
-        "Mine",
-        "it lacks columns",
-    ),
     "nameless": (GOOD.replace('"mine"', '""'), "Mine", "does not state its kind, title"),
     "of no kind": (
         GOOD + "    refines = ('coulom_friction',)\n",
         "Mine",
         "`refines` names 'coulom_friction', which does not exist. Did you mean 'coulomb_friction'",
     ),
-    "taken": ("from excite_cli.effects.spring import Spring as Mine", "Mine", "another effect"),
 }
 FAILING = {
     "raises": "raise ZeroDivisionError('of mine')",
@@ -54,11 +45,7 @@ FAILING = {
 }
 
 
-@pytest.fixture(autouse=True)
-def _catalogue_read_anew(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    forget(EFFECTS)
-    yield
-    forget(EFFECTS)
+_read_anew = read_anew(EFFECTS)
 
 
 @pytest.mark.parametrize("case", UNUSABLE)
@@ -110,6 +97,4 @@ def test_columns_that_fail_are_set_aside_by_the_diagnosis(
 def install(folder: Path, code: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A package with one module, that declares the effect `mine`."""
     module = "foreign_effects"
-    own_package.install(folder, code, {"mine": f"{module}:{name}"}, module)
-    monkeypatch.syspath_prepend(folder)
-    monkeypatch.delitem(sys.modules, module, raising=False)
+    own_package.install(folder, code, {"mine": f"{module}:{name}"}, monkeypatch, module)

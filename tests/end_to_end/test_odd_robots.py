@@ -9,7 +9,7 @@ from excite_cli.config.load_spec import parse_spec
 from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.excitation.admissible import verdicts
 from excite_cli.excitation.problem import Problem, build_problem
-from excite_cli.excitation.run import continue_run, new_result
+from tests.excitation.smoke import planned
 
 LINK = (
     '<link name="{name}"><inertial><origin xyz="0.1 0 0.2"/><mass value="{mass}"/>'
@@ -35,10 +35,7 @@ def _turns(axis: str, limit: str = 'lower="-2" upper="2" velocity="2" effort="9"
 
 
 def _solve(problem: Problem) -> float:
-    result = continue_run(
-        problem, new_result(problem, [], {}), lambda i: lambda p: None, lambda step, now: None
-    )
-    motion = result.motions[0]
+    motion = planned(problem).motions[0]
     assert all(worst.violations == 0 for worst in motion.margins.values())
     return motion.stacked_condition_number
 

@@ -3,6 +3,8 @@
 The cases come from a development seed; `python -m benchmarks.battery` judges on others.
 """
 
+from typing import Any
+
 import pytest
 from threadpoolctl import threadpool_limits
 
@@ -63,14 +65,17 @@ def test_what_only_comes_near_is_told_as_an_approximation() -> None:
         assert each["approximates"]["covariates"] == ["q[panda_joint4]"]
 
 
-def test_losses_of_driving_and_back_driving_are_told_apart(excite: Installed) -> None:
+def diagnosed(excite: Installed, *effects: str) -> Any:
+    """What is told of three motions of an arm with these effects."""
     brief = ("--set", "optimizer.max_iterations=40", "--motions", "3", "--seed", "3")
     excite.answer("optimize", SMOKE, *brief, "-o", "m.h5")
-    excite.answer(
-        "simulate", SMOKE, "m.h5", "-o", "log.h5", "--seed", "5",
-        "--effect", "gear_loss@shoulder_pitch=0.15,back_driving:0.05",
-    )  # fmt: skip
-    answer = excite.answer("diagnose", SMOKE, "log.h5", "-o", "found.h5")
+    planted = [word for effect in effects for word in ("--effect", effect)]
+    excite.answer("simulate", SMOKE, "m.h5", "-o", "log.h5", "--seed", "5", *planted)
+    return excite.answer("diagnose", SMOKE, "log.h5", "-o", "found.h5")
+
+
+def test_losses_of_driving_and_back_driving_are_told_apart(excite: Installed) -> None:
+    answer = diagnosed(excite, "gear_loss@shoulder_pitch=0.15,back_driving:0.05")
     (found,) = answer["effects"]
     assert (found["kind"], found["joints"]) == ("gear_loss", ["shoulder_pitch"])
     losses = {name: each["value"] for name, each in found["parameters"].items()}
@@ -82,14 +87,11 @@ def test_losses_of_driving_and_back_driving_are_told_apart(excite: Installed) ->
 
 def test_a_sensor_that_saturates_hides_nothing_else_of_its_joint(excite: Installed) -> None:
     ratio, level = 0.07, 12.0  # N·m, of 24 that the motions need
-    brief = ("--set", "optimizer.max_iterations=40", "--motions", "3", "--seed", "3")
-    excite.answer("optimize", SMOKE, *brief, "-o", "m.h5")
-    excite.answer(
-        "simulate", SMOKE, "m.h5", "-o", "log.h5", "--seed", "5",
-        "--effect", f"load_dependent_friction@shoulder_pitch={ratio}",
-        "--effect", f"torque_saturation@shoulder_pitch={level}",
-    )  # fmt: skip
-    answer = excite.answer("diagnose", SMOKE, "log.h5", "-o", "found.h5")
+    answer = diagnosed(
+        excite,
+        f"load_dependent_friction@shoulder_pitch={ratio}",
+        f"torque_saturation@shoulder_pitch={level}",
+    )
     found = {each["kind"]: each for each in answer["effects"]}
     assert set(found) == {"load_dependent_friction", "torque_saturation"}
     assert all(each["joints"] == ["shoulder_pitch"] for each in found.values())

@@ -16,24 +16,16 @@ from excite_cli.config.load_spec import load_spec
 from excite_cli.config.spec import Spec
 from excite_cli.diagnosis.diagnose import diagnose
 from excite_cli.diagnosis.records import Diagnosis
-from excite_cli.dynamics.base_parameters import BaseParameters, find_base_parameters
-from excite_cli.effects.catalogue import kind_named
 from excite_cli.errors import ConfigError
 from excite_cli.identification.identify import Identification, identify
 from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.measurement.hdf5_writer import write_dataset
 from excite_cli.measurement.missing_values import rows_of
-from excite_cli.robot.model import Robot, build_robot
-from tests.cli.program import SMOKE
-
-pytest.importorskip("mujoco")
-
-from excite_cli.simulation.ground_truth import plant
-from excite_cli.simulation.planned_motion import PlannedMotion
 from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
-from excite_cli.trajectory.fourier import FourierTrajectory
+from tests.cli.program import SMOKE
+from tests.diagnosis.simulated_arm import BASE, PITCH, ROBOT, motion, planted
 
 SECONDS, RATE, OFFSET = 6.0, 250.0, 6.0
 GAP = (2.5, 2.8)  # s
@@ -41,35 +33,17 @@ NAMES = ("a", "b", "c")
 
 
 @pytest.fixture(scope="module")
-def robot() -> Robot:
-    return build_robot(load_spec(SMOKE).robot, SMOKE.parent)
-
-
-@pytest.fixture(scope="module")
-def base(robot: Robot) -> BaseParameters:
-    return find_base_parameters(robot)
-
-
-@pytest.fixture(scope="module")
-def recorded(robot: Robot) -> Dataset:
-    motions = []
-    for number, name in enumerate(NAMES):
-        rng = np.random.default_rng(number)
-        trajectory = FourierTrajectory(4, 2 * np.pi / SECONDS)
-        lower, upper = robot.limits.ranges()
-        shape = (trajectory.n_coefficients, robot.n)
-        coefficients = rng.normal(size=shape) * 0.04 * (upper - lower)
-        coefficients[-1] = (lower + upper) / 2
-        motions.append(PlannedMotion(name, trajectory, coefficients))
-    planted = plant(kind_named("torque_offset"), (1,), OFFSET, {})
-    planted = replace(planted, effect=replace(planted.effect, runs=("b",)))
+def recorded() -> Dataset:
+    motions = [replace(motion(k, SECONDS), name=name) for k, name in enumerate(NAMES)]
+    offset = planted("torque_offset", PITCH, OFFSET)
+    offset = replace(offset, effect=replace(offset.effect, runs=("b",)))
     settings = SimulationSettings(rate=RATE, lead_in=0.5)
-    return simulate(robot, motions, settings, [planted]).dataset
+    return simulate(ROBOT, motions, settings, [offset]).dataset
 
 
-def spec_of(robot: Robot, *runs: str) -> Spec:
+def spec_of(*runs: str) -> Spec:
     """The offset declared for `runs`, beside the friction that the arm has."""
-    joint = robot.joint_names[1]
+    joint = ROBOT.joint_names[1]
     listed = ", ".join(f'"{run}"' for run in runs)
     declared = f"{{kind: torque_offset, joints: [{joint}], runs: [{listed}]}}"
     return load_spec(
@@ -112,61 +86,57 @@ def declared_offset(found: Identification | Diagnosis) -> float:
     [NAMES, ("take 0-6 s", "take 6-12 s", "take 7-18 s"), ("x (1)", "x (first half)", "x 2-3 s")],
 )
 def test_an_offset_of_one_run_is_found_whatever_the_run_is_called(
-    names: tuple[str, ...], robot: Robot, base: BaseParameters, recorded: Dataset, tmp_path: Path
+    names: tuple[str, ...], recorded: Dataset, tmp_path: Path
 ) -> None:
-    spec = spec_of(robot, names[1])
+    spec = spec_of(names[1])
     dataset = read_again(renamed(recorded, *names), tmp_path, spec)
     assert dataset.recordings == names
     for call in (identify, diagnose):
-        found: Any = call(robot, base, dataset, spec)
+        found: Any = call(ROBOT, BASE, dataset, spec)
         assert declared_offset(found) == pytest.approx(OFFSET, abs=0.1)
         assert found.held_out_run == names[2]
 
 
 @pytest.mark.parametrize("cut", ["b", "abc"])
 def test_an_offset_of_one_run_is_found_on_both_sides_of_a_gap(
-    cut: str, robot: Robot, base: BaseParameters, recorded: Dataset, tmp_path: Path
+    cut: str, recorded: Dataset, tmp_path: Path
 ) -> None:
-    spec = spec_of(robot, "b")
+    spec = spec_of("b")
     runs = tuple(with_gap(run) if run.name in cut else run for run in recorded.runs)
     dataset = read_again(replace(recorded, runs=runs), tmp_path, spec)
     assert dataset.recordings == NAMES
     assert len(dataset.runs) == len(NAMES) + len(cut)
-    fitted = identify(robot, base, dataset, spec)
-    for found in (fitted, diagnose(robot, base, dataset, spec)):
+    fitted = identify(ROBOT, BASE, dataset, spec)
+    for found in (fitted, diagnose(ROBOT, BASE, dataset, spec)):
         assert declared_offset(found) == pytest.approx(OFFSET, abs=0.1)
         assert found.held_out_run == "c"
     held_out = [trace.run for trace in fitted.traces if trace.held_out]
     assert held_out == (["c/1", "c/2"] if "c" in cut else ["c"])
 
 
-def test_an_offset_of_the_held_out_run_counts_for_the_error(
-    robot: Robot, base: BaseParameters, recorded: Dataset
-) -> None:
+def test_an_offset_of_the_held_out_run_counts_for_the_error(recorded: Dataset) -> None:
     """With the offset declared, b and c are held out in turn and predicted alike."""
-    spec = spec_of(robot, "b", "c")
-    offset = OFFSET * np.eye(robot.n)[1]
+    spec = spec_of("b", "c")
+    offset = OFFSET * np.eye(ROBOT.n)[1]
     *others, last = recorded.runs
     both = replace(recorded, runs=(*others, replace(last, tau=last.tau + offset)))
-    error = identify(robot, base, both, spec, held_out="c").error
-    without = identify(robot, base, both, spec_of(robot, "b"), held_out="c").error
-    assert error.rms[robot.joint_names[1]] < 1.0 < without.rms[robot.joint_names[1]]
+    error = identify(ROBOT, BASE, both, spec, held_out="c").error
+    without = identify(ROBOT, BASE, both, spec_of("b"), held_out="c").error
+    assert error.rms[ROBOT.joint_names[1]] < 1.0 < without.rms[ROBOT.joint_names[1]]
 
 
-def test_a_stretch_may_be_named_alone(
-    robot: Robot, base: BaseParameters, recorded: Dataset, tmp_path: Path
-) -> None:
+def test_a_stretch_may_be_named_alone(recorded: Dataset, tmp_path: Path) -> None:
     first, second, third = recorded.runs
     later = second.t >= GAP[1]
-    half = replace(second, tau=second.tau - OFFSET * np.eye(robot.n)[1] * ~later[:, None])
-    spec = spec_of(robot, "b/2")
+    half = replace(second, tau=second.tau - OFFSET * np.eye(ROBOT.n)[1] * ~later[:, None])
+    spec = spec_of("b/2")
     dataset = read_again(replace(recorded, runs=(first, with_gap(half), third)), tmp_path, spec)
-    assert declared_offset(identify(robot, base, dataset, spec)) == pytest.approx(OFFSET, abs=0.1)
+    assert declared_offset(identify(ROBOT, BASE, dataset, spec)) == pytest.approx(OFFSET, abs=0.1)
 
 
 @pytest.mark.parametrize("call", [identify, diagnose])
 def test_runs_that_are_not_there_or_held_out_are_refused(
-    call: Callable[..., Any], robot: Robot, base: BaseParameters, recorded: Dataset
+    call: Callable[..., Any], recorded: Dataset
 ) -> None:
     """Of an effect of the held-out run alone nothing would be fitted; its error be all its own."""
     dataset = renamed(recorded, "slow", "payload", "take 6-12 s")
@@ -183,6 +153,6 @@ def test_runs_that_are_not_there_or_held_out_are_refused(
         ),
     ):
         with pytest.raises(ConfigError) as error:
-            call(robot, base, dataset, spec_of(robot, *runs))
+            call(ROBOT, BASE, dataset, spec_of(*runs))
         assert str(error.value) == words
-    call(robot, base, dataset, spec_of(robot, "take 6-12 s"), "payload")
+    call(ROBOT, BASE, dataset, spec_of("take 6-12 s"), "payload")

@@ -49,13 +49,6 @@ def _inspected(problem: Problem) -> Inspection:
     return _seen(problem, problem.still(problem.robot.posture) + drawn(problem, 0.15), rate=200.0)
 
 
-AROUND = (
-    "constraints.surroundings={floor: -0.6, boxes: {shelf: {size: [0.2, 0.4, 0.05], position: "
-    "[0.6, 0, 0.2], orientation: [0.1, 0.2, 0.3]}}, walls: {left: {point: [0, 1.2, 0], normal: "
-    "[0.1, -1, 0]}}}"
-)
-
-
 def test_both_computations_agree(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
     found = _inspected(problem)
     assert [each.name for each in found.second] == ["self_collision", "surroundings"]

@@ -34,7 +34,7 @@ from excite_cli.robot.tree import skeleton_of
 from excite_cli.robot.urdf_joints import survey
 from excite_cli.shown.note import Level
 from excite_cli.summary.problem import problem_notes
-from tests.proposal.robots import GOOD, joint, link, written
+from tests.proposal.robots import GOOD, joint, link, serial, written
 from tests.robot.coupled_robots import CLAW, HAND, coupled_robot, urdf_of
 from tests.robot.formats.test_sdf import joint as sdf_joint
 from tests.robot.formats.test_sdf import link as sdf_link
@@ -203,16 +203,10 @@ def test_limits_that_no_robot_has(tmp_path: Path, lower: str, upper: str, words:
 def follower(folder: Path, driver: str, limits: str, how: str) -> Path:
     """A joint, and one that follows it, with these limits."""
     more = f'<mimic joint="driver" {how}/>'
-    return written(
-        folder,
-        link("base"),
-        joint("shoulder", "base", "upper", GOOD),
-        link("upper"),
-        joint("driver", "upper", "one", f'{driver} velocity="3" effort="50"'),
-        link("one"),
-        joint("follower", "upper", "two", f'{limits} velocity="3" effort="50"', more=more),
-        link("two"),
-    )
+    driven = joint("driver", "upper", "one", f'{driver} velocity="3" effort="50"')
+    second = joint("follower", "upper", "two", f'{limits} velocity="3" effort="50"', more=more)
+    names = "base shoulder upper driver one"
+    return serial(folder, names, second, link("two"), driver=driven)
 
 
 def test_equal_limits_of_a_follower_hold_its_driver(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from excite_cli.robot.link_frame import branches, leaves
 from excite_cli.robot.model import Robot, build_robot, links_by_joint
 from excite_cli.robot.tree import skeleton_of
 from tests.cli.program import SMOKE
-from tests.proposal.robots import GOOD, joint, link, written
+from tests.proposal.robots import GOOD, joint, link, serial, written
 from tests.robot.random_robots import random_robot
 
 
@@ -74,16 +74,8 @@ def test_a_base_that_drives_or_floats_stands_still(tmp_path: Path, kind: str) ->
 
 
 def test_a_locked_joint_may_be_called_as_a_link(tmp_path: Path) -> None:
-    written(
-        tmp_path,
-        link("base"),
-        joint("arm", "base", "upper", GOOD),
-        link("upper"),
-        joint("gripper", "upper", "jaw", GOOD),
-        link("jaw"),
-        joint("fixed", "upper", "gripper", kind="fixed"),
-        link("gripper", 2.0),
-    )
+    hand = joint("fixed", "upper", "gripper", kind="fixed"), link("gripper", 2.0)
+    serial(tmp_path, "base arm upper gripper jaw", *hand)
     robot = build_robot(RobotSpec(urdf="robot.urdf", joints=("arm",)), tmp_path)
     assert set(links_by_joint(robot)["arm"]) == {"upper", "gripper", "jaw"}
     assert np.isclose(robot.model.inertias[1].mass, 4.0)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from excite_cli.config.robot_spec import RobotSpec
@@ -27,13 +28,27 @@ def arm() -> Robot:
     return build_robot(RobotSpec(urdf="example-robot-data:ur10"))
 
 
+def drawn(
+    robot: Robot, name: str, seed: int, seconds: float, size: ArrayLike, middle: ArrayLike
+) -> PlannedMotion:
+    """Three harmonics about `middle` (n), with coefficients of the deviation `size` (n)."""
+    trajectory = FourierTrajectory(3, 2 * np.pi / seconds)
+    shape = (trajectory.n_coefficients, robot.n)
+    coefficients = np.asarray(size) * np.random.default_rng(seed).normal(size=shape)
+    coefficients[-1] = middle
+    return PlannedMotion(name, trajectory, coefficients)
+
+
 def motion(robot: Robot, seed: int = 0, name: str = "motion_1") -> PlannedMotion:
     """A lively motion of three harmonics."""
-    rng = np.random.default_rng(seed)
-    trajectory = FourierTrajectory(3, 2 * np.pi / SECONDS)
-    coefficients = 0.15 * rng.normal(size=(trajectory.n_coefficients, robot.n))
-    coefficients[-1] = [0.3, -1.0, 1.0, -0.5, 0.7, 0.2][: robot.n]
-    return PlannedMotion(name, trajectory, coefficients)
+    middle = [0.3, -1.0, 1.0, -0.5, 0.7, 0.2][: robot.n]
+    return drawn(robot, name, seed, SECONDS, 0.15, middle)
+
+
+def about_posture(robot: Robot, name: str, seed: int, seconds: float) -> PlannedMotion:
+    """The same of any robot with a posture: 0.15 rad, 0.015 m."""
+    size = np.where(robot.sliding, 0.015, 0.15)
+    return drawn(robot, name, seed, seconds, size, robot.posture)
 
 
 def planted(kind: str, joints: tuple[int, ...], value: float, **others: float) -> PlantedEffect:

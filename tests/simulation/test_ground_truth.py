@@ -13,14 +13,8 @@ from excite_cli.robot.model import Robot
 from excite_cli.simulation.build import assemble
 from excite_cli.simulation.covariate_series import CovariateSeries, parse_series
 from excite_cli.simulation.ground_truth import parse_planted
-from tests.simulation.arms import arm
 
 RUNS = {"motion_1": ("motion_1_take_1", "motion_1_take_2"), "motion_2": ("motion_2",)}
-
-
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return arm()
 
 
 def test_a_local_kind_gives_one_effect_for_each_joint(robot: Robot) -> None:

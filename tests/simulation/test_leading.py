@@ -9,15 +9,10 @@ from excite_cli.measurement.torque_sources.command import DriveLaw
 from excite_cli.robot.model import Robot
 from excite_cli.simulation.leading import LeadingSetPoints
 from excite_cli.simulation.position_drive import PositionDrive
-from tests.simulation.arms import arm, motion, played
+from tests.simulation.arms import motion, played
 from tests.simulation.test_position_drive import DRIVE, KD, KP, QUICK
 
 LAW = DriveLaw(np.array(KP), np.array(KD), np.full(6, np.inf), 0.02)
-
-
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return arm()
 
 
 @pytest.mark.parametrize("speeds", [False, True])

@@ -24,7 +24,6 @@ from excite_cli.simulation.simulate import Simulation, simulate
 from tests.simulation.arms import (
     ELBOW,
     IDEAL,
-    arm,
     beyond_rigid,
     inner,
     motion,
@@ -36,11 +35,6 @@ from tests.simulation.arms import (
 )
 
 pytest.importorskip("mujoco")
-
-
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return arm()
 
 
 @pytest.fixture(scope="module")

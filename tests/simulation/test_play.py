@@ -21,14 +21,9 @@ from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 from excite_cli.trajectory.bspline import BSplineTrajectory
 from tests.robot.random_robots import random_robot
-from tests.simulation.arms import ELBOW, IDEAL, arm, beyond_rigid, motion, played, rms
+from tests.simulation.arms import ELBOW, IDEAL, beyond_rigid, motion, played, rms
 
 pytest.importorskip("mujoco")
-
-
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return arm()
 
 
 def test_the_motion_is_followed_although_the_controller_knows_the_urdf_only(

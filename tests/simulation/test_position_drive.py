@@ -35,11 +35,6 @@ QUICK = replace(IDEAL, rate=4000.0, control_rate=4000.0, step=2.5e-4, lead_in=1.
 
 
 @pytest.fixture(scope="module")
-def robot() -> Robot:
-    return arm()
-
-
-@pytest.fixture(scope="module")
 def followed(robot: Robot) -> Simulation:
     return played(robot, settings=QUICK)
 

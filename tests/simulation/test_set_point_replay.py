@@ -16,16 +16,11 @@ from excite_cli.simulation.set_point_replay import (
     set_point_errors,
 )
 from excite_cli.simulation.simulate import Simulation
-from tests.simulation.arms import IDEAL, arm, planted, played, states
+from tests.simulation.arms import IDEAL, planted, played, states
 from tests.simulation.test_position_drive import DRIVE, KD, KP
 
 mujoco = pytest.importorskip("mujoco")
 HORIZONS = (0.1, 1.0, 3.0)
-
-
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return arm()
 
 
 @pytest.fixture(scope="module")

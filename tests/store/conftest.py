@@ -7,9 +7,10 @@ from excite_cli.config.load_spec import load_spec
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.random_baseline import random_baseline
 from excite_cli.excitation.result import Result
-from excite_cli.excitation.run import continue_run, new_result
+from excite_cli.excitation.run import new_result
 from excite_cli.store.own_file import versions
 from excite_cli.store.result_file import write_result
+from tests.excitation.smoke import planned
 
 CONFIG = Path(__file__).resolve().parents[2] / "configs" / "smoke.yaml"
 
@@ -30,12 +31,7 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> Stored:
         patch.setenv("XDG_CACHE_HOME", str(folder / "cache"))
         spec = load_spec(CONFIG, ["optimizer.max_iterations=4", "seed=5"])
         problem = build_problem(spec, CONFIG.parent)
-        result = continue_run(
-            problem,
-            new_result(problem, [], versions()),
-            lambda index: lambda progress: None,
-            lambda step, current: None,
-        )
+        result = planned(problem, new_result(problem, [], versions()))
         baseline = random_baseline(problem, 2, spec.seed, 3, 0.0, lambda drawn, best: None)
     result = replace(
         result,

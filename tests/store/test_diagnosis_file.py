@@ -171,9 +171,7 @@ def test_files_are_told_apart(stored: Stored, path: Path, tmp_path: Path) -> Non
         read_result(path)
 
 
-def test_missing_foreign_and_cut_files(path: Path, tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="There is no file"):
-        read_diagnosis(tmp_path / "none.h5")
+def test_cut_files(path: Path, tmp_path: Path) -> None:
     cut = tmp_path / "cut.h5"
     cut.write_bytes(path.read_bytes()[:3000])
     with pytest.raises(FileError, match="not a readable HDF5 file"):

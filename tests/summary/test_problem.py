@@ -6,17 +6,13 @@ from excite_cli.config.load_spec import parse_spec
 from excite_cli.excitation.problem import build_problem
 from excite_cli.shown.note import Level
 from excite_cli.summary.problem import problem_notes
-from tests.proposal.robots import GOOD, joint, link, written
+from tests.proposal.robots import GOOD, joint, link, serial
 
 
 def warnings(folder: Path, joints: str) -> list[str]:
-    written(
+    serial(
         folder,
-        link("base"),
-        joint("shoulder", "base", "upper", GOOD),
-        link("upper"),
-        joint("crank", "upper", "rod", GOOD),
-        link("rod"),
+        "base shoulder upper crank rod",
         joint("knee", "upper", "shin", GOOD),
         link("shin"),
         '<loop_joint name="loop"><link1 link="rod"/><link2 link="shin"/></loop_joint>',
