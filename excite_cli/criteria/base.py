@@ -10,12 +10,11 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from excite_cli.arrays import Array as Array
 
 if TYPE_CHECKING:
     from excite_cli.config.spec import CriterionSpec
-
-Array = NDArray[np.float64]
 
 # p of the smooth stand-ins of a criterion with corners, one after the other.
 SHARPNESS = (4.0, 16.0, 64.0, 256.0, 1024.0)

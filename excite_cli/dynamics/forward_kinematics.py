@@ -15,11 +15,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from excite_cli.arrays import Array
 from excite_cli.kernels.compiled import KERNELS
 from excite_cli.robot.model import Robot
 from excite_cli.trajectory.base import Trajectory
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

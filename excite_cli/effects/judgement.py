@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.arrays import Array
+
 if TYPE_CHECKING:
     from excite_cli.effects.base import Effect
     from excite_cli.effects.parameter import Parameter
     from excite_cli.effects.signals import Signals
 
 # How far several fitted parameters may be off by chance: lengths and distances in their errors.
-
-Array = NDArray[np.float64]
 
 
 # Chance of a true effect to look impossible by the error of the fit, and be refused.
@@ -67,10 +67,6 @@ def nearest_of_sign(values: Array, covariance: Array, signed: NDArray[np.bool_])
         whiten, whiten @ values, (lower, np.full(len(values), np.inf)), method="bvls"
     )
     return np.asarray(np.where(signed & (found.x <= 1e-12 * np.abs(values)), 0.0, found.x))
-
-
-# By how much a shape parameter is changed, up and down, once its effect is found.
-_FINER = (1.35, 1.15, 1.06, 1.02)
 
 
 class Tier(IntEnum):
@@ -128,6 +124,9 @@ class Judgement:
 
     # Share of what it explains that may be lost where fitted numbers are moved to possible ones.
     projection_tolerance: ClassVar[float] = 0.0
+
+    # By how much a shape parameter is changed, up and down, once its effect is found.
+    finer_ratios: ClassVar[tuple[float, ...]] = (1.35, 1.15, 1.06, 1.02)
 
     # Linear parameters that are its size, by name; empty: all of them together.
     size: ClassVar[tuple[str, ...]] = ()
@@ -249,7 +248,7 @@ class Judgement:
 
         A grid names an effect, it does not measure it. Empty: the grid is all there is.
         """
-        return steps_by_ratio(self.shape[name], _FINER)
+        return steps_by_ratio(self.shape[name], self.finer_ratios)
 
     def shapes_near(self, signals: Sequence[Signals]) -> list[dict]:
         """Shapes that may be better once the effect is found: by `finer_steps`, one at a time."""

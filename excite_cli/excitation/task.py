@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Mask
 from excite_cli.constraints.base import Array, Constraint, Indices, Parts
 from excite_cli.criteria.base import Criterion
 from excite_cli.dynamics.forward_kinematics import States
@@ -163,8 +163,6 @@ def _within_ends(problem: Problem, guards: list[Array]) -> list[Array]:
 # Derivatives with respect to q at one instant reach the coefficients through the same basis row,
 # so weighted sums over thousands of rows collapse to one matrix product per pair of derivative
 # orders: Σ_t (b_t b_tᵀ) ⊗ G_t.
-
-Mask = NDArray[np.bool_]
 
 # Residuals beyond this concern no solver: they may be lower bounds instead of exact.
 REACH = 1.0

@@ -18,6 +18,7 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.arrays import Array
 from excite_cli.config.constraints_spec import SelfCollisionSpec
 from excite_cli.disk_cache import store_arrays, stored_arrays
 from excite_cli.errors import RobotError
@@ -91,8 +92,6 @@ def _reason(data: dict[str, Any] | None) -> Reason | None:
     distance, apart = data["distance"], tuple(LinksApart(**each) for each in data["apart"])
     return Reason(Why(data["why"]), None if distance is None else float(distance), apart)
 
-
-Array = NDArray[np.float64]
 
 _ALWAYS = 0.99  # share of the sample in contact
 _CONTACT_SAMPLES = 200

@@ -15,13 +15,12 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from excite_cli.arrays import Array
 from excite_cli.errors import RobotError
 from excite_cli.geometry.capsule_fit import sphere_points
 from excite_cli.robot.description import RobotDescription
 from excite_cli.robot.mesh_paths import Kind, check_mesh_paths, located
 from excite_cli.robot.model import Robot
-
-Array = NDArray[np.float64]
 
 _RIM = 32  # corners of a rim that stands for a circle
 _BALL = 240  # corners of a polyhedron that stands for a sphere

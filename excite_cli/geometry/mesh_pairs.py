@@ -10,14 +10,13 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.arrays import Array, Indices
 from excite_cli.geometry.link_meshes import LinkMesh, Part, Poses
 from excite_cli.geometry.reasons import ContactMeaning
 from excite_cli.geometry.world_segments import nearest_points
 from excite_cli.kernels.compiled import KERNELS
 from excite_cli.robot.link_frame import MovedBodies
 from excite_cli.robot.model import Robot
-
-Array = NDArray[np.float64]
 
 _TOUCH = 1e-9  # [m]
 _FAR = 1e3  # [m] farther than any robot reaches
@@ -240,8 +239,6 @@ class PairTable:
 # u is, and only its sharpness depends on u. Gilbert's iteration finds a good one: v is a point of
 # B − A, w the corner of B − A that is lowest along u = v/|v| (so u·w is the bound), and the next
 # v is the point of the segment from v to w that is nearest to the origin.
-
-Indices = NDArray[np.intp]
 
 _STEPS = 8
 _CROSSED = 1e-9  # [m] hulls nearer than this have no direction between them

@@ -7,11 +7,9 @@ from typing import NamedTuple
 import coal
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array
 from excite_cli.config.constraints_spec import BoxSpec, SurroundingsSpec, WallSpec
-
-Array = NDArray[np.float64]
 
 FLOOR = "floor"
 

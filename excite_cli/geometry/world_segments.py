@@ -5,7 +5,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.robot.capsule import Capsule
@@ -92,9 +91,6 @@ def _perpendicular(first: Array, second: Array) -> Array:
         if size > 1e-6 * scale and size > 1e-18:
             return vector / size
     return np.array([0.0, 0.0, 1.0])
-
-
-Indices = NDArray[np.intp]
 
 
 class WorldSegments:

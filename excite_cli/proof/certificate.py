@@ -15,6 +15,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.arrays import Array
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.proof.enclosed_motion import (
     EnclosedMotion,
@@ -58,7 +59,6 @@ class Worst:
         return replace(worse, violations=self.violations + later.violations)
 
 
-Array = NDArray[np.float64]
 State = Literal["proved", "sampled", "broken"]
 
 _WIDTH = 0.04  # [s] of the first intervals

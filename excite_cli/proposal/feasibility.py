@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array
 from excite_cli.config.load_spec import parsed_spec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.joint_columns import Quantity
@@ -75,7 +75,6 @@ def first_posture(
     return FirstPosture(moved, others, f"{words}, at least a tenth of the range from the limits")
 
 
-Array = NDArray[np.float64]
 Tree = dict[str, Any]
 Comments = dict[tuple[str, ...], str]
 

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.arrays import Array
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.robot.limits import JointRange, Limits
@@ -104,8 +105,6 @@ def require_known(joint: str, names: list[str], where: str) -> None:
 # by virtual power. C has one entry a row, the multiplier of the joint that is followed, so
 # everything that is known of all joints (regressor, gradients, enclosures over intervals) is
 # known exactly of those that move on their own.
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from excite_cli.config.load_spec import load_spec, parse_spec
 from excite_cli.config.spec import IdentifiedSpec, Spec
 from excite_cli.diagnosis.candidates import effect_of
-from excite_cli.diagnosis.records import Diagnosis, EffectRecord
+from excite_cli.diagnosis.records import Diagnosis, EffectRecord, by_joint
 from excite_cli.diagnosis.reduced_model import reduced_model
 from excite_cli.dynamics.regressor import standard_parameter_names
 from excite_cli.effects.base import Effect

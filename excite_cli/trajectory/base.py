@@ -10,12 +10,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import null_space
 
+from excite_cli.arrays import Array as Array
 from excite_cli.config.trajectory_spec import BSplineSpec, FourierSpec
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ the controls, moves the robot on, and writes the readout a few times a second.
 
 import contextlib
 import errno
-import importlib
 import io
 import socket
 import time
@@ -17,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from excite_cli.errors import ConfigError, MissingExtraError
+from excite_cli.errors import ConfigError, optional_module
 from excite_cli.excitation.problem import Problem
 from excite_cli.robot.model import Robot
 from excite_cli.trajectory.fade import Segment
@@ -253,13 +252,11 @@ class _Player:
 
 
 def _viser() -> Any:
-    try:
-        return importlib.import_module("viser")
-    except ImportError as error:
-        raise MissingExtraError(
-            "Playing motions in the browser needs viser, which is not installed. Run: "
-            "pip install 'excite-cli[view]' (or take --png or --gif)."
-        ) from error
+    return optional_module(
+        "viser",
+        "Playing motions in the browser needs viser, which is not installed. Run: "
+        "pip install 'excite-cli[view]' (or take --png or --gif).",
+    )
 
 
 def _server(viser: Any, serving: Serving, title: str) -> Any:

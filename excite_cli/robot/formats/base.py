@@ -12,6 +12,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from excite_cli.arrays import Array
 from excite_cli.robot.formats.kept_meshes import keep_mesh
 
 
@@ -92,7 +93,6 @@ class RobotFormat(ABC):
 
 # Parts of a URDF that is written from another format.
 
-Array = NDArray[np.float64]
 Element = ElementTree.Element
 
 _BALL_POINTS = 200
