@@ -138,7 +138,9 @@ def sufficient(traced: SearchResult, models: ModelComparison) -> list[int]:
     every, found = (with_everyday(traced, some) for some in (traced.chosen, kept))
     if models.difference(found, every).better:
         found = every
-    best, larger = sorted((plain, found), key=lambda some: _width(traced, some))
+    best, larger = sorted(
+        (plain, found), key=lambda some: sum(traced.candidates[i].width for i in some)
+    )
     gained = models.difference(best, larger)
     if gained.better and gained.of_error > np.log(rules.AS_GOOD):
         best = larger
@@ -178,8 +180,3 @@ def _of_single_runs(
             or models.missed(found, judge.without(i, found), traced.candidates[i].rows)
         )
     ]
-
-
-def _width(traced: SearchResult, some: Sequence[int]) -> int:
-    """Number of parameters."""
-    return sum(traced.candidates[i].width for i in some)

@@ -44,10 +44,6 @@ class MotionTask:
         self.k = self.free.shape[1]
         self.evaluations = 0
 
-    def with_guards(self, guards: list[Array]) -> "MotionTask":
-        """The same task with other guards."""
-        return MotionTask(self.problem, self.stack, guards)
-
     @property
     def size(self) -> int:
         """Number of free variables."""

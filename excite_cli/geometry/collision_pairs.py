@@ -11,7 +11,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
-from itertools import product
+from itertools import combinations, product
 from typing import Any
 
 import coal
@@ -133,7 +133,7 @@ def choose_pairs(
     dropped: dict[tuple[int, int], Reason] = {}
     possible: list[tuple[int, int]] = []
     known = _Known(robot, spec)
-    for pair in _all_pairs(len(capsules)):
+    for pair in combinations(range(len(capsules)), 2):
         reason = known.reason(capsules[pair[0]], capsules[pair[1]])
         if reason:
             dropped[pair] = reason
@@ -156,10 +156,6 @@ def choose_pairs(
             for pair in sorted(dropped)
         ),
     )
-
-
-def _all_pairs(count: int) -> Iterator[tuple[int, int]]:
-    return ((i, j) for i in range(count) for j in range(i + 1, count))
 
 
 class _Known:

@@ -226,4 +226,4 @@ def _model(phi: Any, records: list[EffectRecord], robot: Robot, path: Path) -> I
 def _by_joint(values: Any, robot: Robot) -> dict[str, float] | None:
     if not isinstance(values, list) or len(values) != robot.n:
         return None
-    return dict(zip(robot.joint_names, map(float, values), strict=True))
+    return by_joint(robot.joint_names, values)

@@ -239,10 +239,6 @@ def _in_words(found: Identification | StoredFit) -> str:
     return f"{_fit_in_words(found.fit)}; {error}"
 
 
-def _stored_parts(found: StoredFit) -> Parts:
-    return [_parameter_table(found.fit), _error_table(found), *link_parts(found.fit.links)]
-
-
 # The page of a fit.
 
 
@@ -375,7 +371,12 @@ def correlated_parameters(fit: Fit) -> tuple[Block, ...]:
 
 show(Fit, _fit_in_words, lambda fit: [_parameter_table(fit)], OF_FIT)
 show(Identification, _in_words, identification_parts, OF_IDENTIFICATION)
-show(StoredFit, _in_words, _stored_parts, OF_IDENTIFICATION)
+show(
+    StoredFit,
+    _in_words,
+    lambda found: [_parameter_table(found.fit), _error_table(found), *link_parts(found.fit.links)],
+    OF_IDENTIFICATION,
+)
 
 
 # What the robot carries, as a table and as data.
@@ -425,7 +426,8 @@ def load_parts(found: LoadIdentification) -> Parts:
 def _load_in_words(found: LoadIdentification) -> str:
     """Mass and centre, from how much data."""
     mass = found.parameters["mass"]
-    centre = ", ".join(with_deviation(1e3 * p.value, 1e3 * p.std) for p in _centre(found))
+    places = [found.parameters[name] for name in ("cx", "cy", "cz")]
+    centre = ", ".join(with_deviation(1e3 * each.value, 1e3 * each.std) for each in places)
     doubt = "" if found.possible else " These values are physically infeasible."
     if any(each.kind == "more_than_a_load" for each in found.findings):
         doubt += " The data contain more than a rigid payload, which the ± do not cover."
@@ -433,10 +435,6 @@ def _load_in_words(found: LoadIdentification) -> str:
         f"{found.link} carries {with_deviation(mass.value, mass.std)} kg with its centre at "
         f"({centre}) mm, from {found.seconds:.3g} s of motion.{doubt}"
     )
-
-
-def _centre(found: LoadIdentification) -> list[Any]:
-    return [found.parameters[name] for name in ("cx", "cy", "cz")]
 
 
 def _load_data(found: LoadIdentification) -> dict[str, Any]:
