@@ -13,9 +13,8 @@ from math import inf
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from excite_cli.arrays import Array
+from excite_cli.arrays import Array, Mask
 
 if TYPE_CHECKING:
     from excite_cli.effects.base import Effect
@@ -53,7 +52,7 @@ def half_of(covariance: Array) -> Array:
     return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 1e-12)))
 
 
-def nearest_of_sign(values: Array, covariance: Array, signed: NDArray[np.bool_]) -> Array:
+def nearest_of_sign(values: Array, covariance: Array, signed: Mask) -> Array:
     """The nearest parameters (p,) of which those that are `signed` are not negative.
 
     minimise (x − values)ᵀ covariance⁻¹ (x − values) subject to x_k ≥ 0, a bounded least-squares

@@ -16,9 +16,8 @@ from typing import Any
 
 import coal
 import numpy as np
-from numpy.typing import NDArray
 
-from excite_cli.arrays import Array
+from excite_cli.arrays import Array, Indices
 from excite_cli.config.constraints_spec import SelfCollisionSpec
 from excite_cli.disk_cache import store_arrays, stored_arrays
 from excite_cli.errors import RobotError
@@ -282,7 +281,7 @@ def _contacts(
 
 
 def _descend(
-    robot: Robot, measure: PairDistances, starts: Array, pairs: NDArray[np.intp], target: float
+    robot: Robot, measure: PairDistances, starts: Array, pairs: Indices, target: float
 ) -> Array:
     """Least distance (K,) [m] found for each pair on the way from its `starts` (S, K, n).
 

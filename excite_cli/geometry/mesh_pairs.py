@@ -8,9 +8,8 @@ from typing import Any
 
 import coal
 import numpy as np
-from numpy.typing import NDArray
 
-from excite_cli.arrays import Array, Indices
+from excite_cli.arrays import Array, Indices, Mask
 from excite_cli.geometry.link_meshes import LinkMesh, Part, Poses
 from excite_cli.geometry.reasons import ContactMeaning
 from excite_cli.geometry.world_segments import nearest_points
@@ -199,7 +198,7 @@ class PairTable:
         first, second, coefficients = (np.ascontiguousarray(part) for part in self._spline.tck)
         return first, second, coefficients.reshape(len(first) - 4, len(second) - 4)
 
-    def holds(self, at: Array) -> NDArray[np.bool_]:
+    def holds(self, at: Array) -> Mask:
         """Whether positions (T, 2) of the two joints are within the table (T,)."""
         low, high = (np.array([grid[end] for grid in self.grids]) for end in (0, -1))
         inside = (at >= low) & (at <= high)

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from excite_cli.arrays import Array
+from excite_cli.arrays import Array, Indices
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.robot.limits import JointRange, Limits
@@ -117,7 +116,7 @@ class Coupling:
     """
 
     joint_names: tuple[str, ...]
-    driver: NDArray[np.intp]
+    driver: Indices
     multiplier: Array
     offset: Array
     limits: Limits

@@ -191,20 +191,16 @@ def _robot(path: Path, config: str, folder: str, fingerprint: str) -> tuple[Spec
     spec = parse_spec(config, f"the config stored in {path}")
     robot = build_measured_robot(spec.robot, Path(folder))
     if robot.fingerprint() != fingerprint:
-        raise _other_robot(path, spec)
+        raise FileError(
+            f"{path} was made with another robot than the URDF gives now ({spec.robot.urdf}). "
+            "Identify again."
+        )
     return spec, Path(folder), robot
 
 
 def _other_bodies(path: Path) -> FileError:
     return FileError(
         f"{path} holds parameters of other joints or bodies than its config. Identify again."
-    )
-
-
-def _other_robot(path: Path, spec: Spec) -> FileError:
-    return FileError(
-        f"{path} was made with another robot than the URDF gives now ({spec.robot.urdf}). Identify "
-        "again."
     )
 
 

@@ -137,7 +137,11 @@ def play_in_browser(
     ConfigError
         The host or the port cannot be used.
     """
-    viser = _viser()
+    viser = optional_module(
+        "viser",
+        "Playing motions in the browser needs viser, which is not installed. Run: "
+        "pip install 'excite-cli[view]' (or take --png or --gif).",
+    )
     times = np.linspace(0.0, 1.0, _SEEN)
     paths = [
         s.trajectory.states(times * s.trajectory.duration, s.coefficients)[0] for s in segments
@@ -249,14 +253,6 @@ class _Player:
             times = np.linspace(0.0, duration, int(np.ceil(duration * _RATE)) + 1)
             self._known[name] = instants_of(self._problem, segment, times)
         return self._known[name]
-
-
-def _viser() -> Any:
-    return optional_module(
-        "viser",
-        "Playing motions in the browser needs viser, which is not installed. Run: "
-        "pip install 'excite-cli[view]' (or take --png or --gif).",
-    )
 
 
 def _server(viser: Any, serving: Serving, title: str) -> Any:
