@@ -239,6 +239,10 @@ def _in_words(found: Identification | StoredFit) -> str:
     return f"{_fit_in_words(found.fit)}; {error}"
 
 
+def _stored_parts(found: StoredFit) -> Parts:
+    return [_parameter_table(found.fit), _error_table(found), *link_parts(found.fit.links)]
+
+
 # The page of a fit.
 
 
@@ -371,12 +375,7 @@ def correlated_parameters(fit: Fit) -> tuple[Block, ...]:
 
 show(Fit, _fit_in_words, lambda fit: [_parameter_table(fit)], OF_FIT)
 show(Identification, _in_words, identification_parts, OF_IDENTIFICATION)
-show(
-    StoredFit,
-    _in_words,
-    lambda found: [_parameter_table(found.fit), _error_table(found), *link_parts(found.fit.links)],
-    OF_IDENTIFICATION,
-)
+show(StoredFit, _in_words, _stored_parts, OF_IDENTIFICATION)
 
 
 # What the robot carries, as a table and as data.
