@@ -21,7 +21,7 @@ from excite_cli.errors import FileError, refusal
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # of Linux
 
 
-def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
+def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
     """Let `write` fill a temporary file beside `path`, then put it in place.
 
     Raises
@@ -52,11 +52,7 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
 
 def write_text_atomically(path: Path, text: str) -> None:
     """Put `text` in place as UTF-8; raises as `write_atomically` does."""
-    write_atomically(path, lambda temporary: _write_text(temporary, text))
-
-
-def _write_text(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
+    write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 
 
 def write_folder_atomically(path: Path, write: Callable[[Path], None]) -> None:

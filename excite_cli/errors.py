@@ -8,6 +8,8 @@ import difflib
 import errno
 import re
 from collections.abc import Iterable, Sequence
+from importlib import import_module
+from typing import Any
 
 _ENOUGH_TO_GUESS = 3  # letters
 
@@ -48,6 +50,20 @@ class ContradictionError(FileError):
 
 class MissingExtraError(ExciteError):
     """An optional library is needed for what was asked and is not installed."""
+
+
+def optional_module(name: str, missing: str) -> Any:
+    """The module `name` of a library that may not be installed.
+
+    Raises
+    ------
+    MissingExtraError
+        It is not; `missing` says what needs it, and how to install it.
+    """
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise MissingExtraError(missing) from error
 
 
 class NoAdmissibleMotionError(ExciteError):

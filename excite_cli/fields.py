@@ -53,9 +53,9 @@ def data_of(value: Any, *names: str) -> Any:
 def public_data(record: Any) -> dict[str, Any]:
     """The fields of a record that are `PUBLIC`, as plain values."""
     hints = get_type_hints(type(record), include_extras=True)
-    own = [name for name, hint in hints.items() if _is_public(hint)]
+    own = [
+        name
+        for name, hint in hints.items()
+        if get_origin(hint) is Annotated and PUBLIC in get_args(hint)
+    ]
     return dict(data_of(record, *own)) if own else {}
-
-
-def _is_public(hint: Any) -> bool:
-    return get_origin(hint) is Annotated and PUBLIC in get_args(hint)

@@ -195,7 +195,8 @@ class _Loop:
         if last is None:
             return state.with_round(self._plans.first(state))
         if last.missing is not None:
-            return state.with_round(last.with_motion(self._takes.measured(state, last.missing)))
+            takes = Takes(self.case, self.measure, self.folder, self.retries, self.tell)
+            return state.with_round(last.with_motion(takes.measured(state, last.missing)))
         if last.learned is None:
             state = state.with_round(replace(last, learned=self._learned(state, last)))
             return ended(state, self._until)
@@ -257,10 +258,6 @@ class _Loop:
     @property
     def _plans(self) -> RoundPlans:
         return RoundPlans(self.case, self.folder, self.workers, self.progress, self.tell)
-
-    @property
-    def _takes(self) -> Takes:
-        return Takes(self.case, self.measure, self.folder, self.retries, self.tell)
 
     def _say(self, text: str) -> None:
         self.tell(Note(Level.INFO, text))

@@ -21,7 +21,6 @@ from excite_cli.excitation.inspection import (
 )
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
-from excite_cli.proof.certificate import Path as MotionPath
 from excite_cli.robot.model import Array
 from excite_cli.shown.note import Level, Note, Tell, log_note, unheard
 from excite_cli.store.result_file import is_result, read_result, read_samples
@@ -71,7 +70,8 @@ def check(
         raise FileError(f"Two motions are called {twice}. Give each a name of its own.")
     result = _result_of(motions)
     if result is not None:
-        _compare_configs(problem, result, _name_of(motions), tell)
+        name = str(motions) if isinstance(motions, str | Path) else "the result"
+        _compare_configs(problem, result, name, tell)
     checker = mesh_check_of(problem) if meshes else None
     look = Look(rate, random, problem.spec.seed)
     stored = _samples(motions) if slow is None else {}
@@ -82,7 +82,8 @@ def check(
         path = path_of(problem, played.trajectory, played.coefficients)
         found[segment.name] = inspect(problem, path, checker, look)
         if index in stored:
-            differences[segment.name] = _difference(path, stored[index])
+            t, *states = stored[index]
+            differences[segment.name] = SampleDifference(*largest_mismatch(path, t, states))
     doubted = () if result is None else result.doubted()
     doubts = {f"motion_{each.index}": each.doubt for each in doubted}
     return Inspections(found, look, differences, slow, doubts)
@@ -119,10 +120,6 @@ def _compare_configs(problem: Problem, result: Result, name: str, tell: Tell) ->
         tell(Note(Level.INFO, text))
 
 
-def _name_of(motions: Motions) -> str:
-    return str(motions) if isinstance(motions, str | Path) else "the result"
-
-
 def _slowed(problem: Problem, segment: Segment, share: float | None, tell: Tell) -> Segment:
     if share is None:
         return segment
@@ -133,13 +130,7 @@ def _slowed(problem: Problem, segment: Segment, share: float | None, tell: Tell)
 
 
 def _samples(motions: Motions) -> dict[int, tuple[Array, ...]]:
-    """The samples of a result file, by the motion's index."""
+    """The samples t (T,), q, v, a (T, n) of a result file, by the motion's index."""
     if isinstance(motions, str | Path) and is_result(Path(motions)):
         return dict(read_samples(Path(motions)))
     return {}
-
-
-def _difference(path: MotionPath, stored: tuple[Array, ...]) -> SampleDifference:
-    """That of the samples t (T,), q, v, a (T, n)."""
-    t, *states = stored
-    return SampleDifference(*largest_mismatch(path, t, states))

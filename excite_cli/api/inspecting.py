@@ -17,7 +17,7 @@ from excite_cli.api.loading import (
     measured_case,
 )
 from excite_cli.api.outputs import held
-from excite_cli.atomic import write_atomically, write_text_atomically
+from excite_cli.atomic import write_text_atomically
 from excite_cli.checks.all_checks import (
     look,
     row_names,
@@ -241,8 +241,4 @@ def _write(path: Path, problem: Problem | Case, settings: Mapping[str, Any]) -> 
         old = load_spec(problem.file).model_dump(mode="json", exclude_unset=True)
         more = {**changed_values(old, tree), **settings}
         text = amended(problem.file.read_text(encoding="utf-8"), more)
-
-    def write(to: Path) -> None:
-        to.write_text(text, encoding="utf-8")
-
-    write_atomically(path, write)
+    write_text_atomically(path, text)

@@ -220,7 +220,11 @@ class Model(Shown):
         """
         series, single = self._series(q, v, a, t, covariates, start)
         w = np.asarray(weights, dtype=float).reshape(series.q.shape)
-        flat = [effect.kind for effect in self.effects if _without_slope(effect)]
+        flat = [
+            effect.kind
+            for effect in self.effects
+            if type(effect).pull_back is Effect.pull_back and not effect.carried
+        ]
         if flat:
             raise ConfigError(f"no derivatives: {', '.join(dict.fromkeys(flat))} has none.")
         found = self._standing.pull_back(self.made.robot, series, w)
@@ -287,10 +291,6 @@ class Model(Shown):
                     f"{effect.kind} follows the column '{effect.covariate}': give it in "
                     f"covariates, ({count},)."
                 )
-
-
-def _without_slope(effect: Effect) -> bool:
-    return type(effect).pull_back is Effect.pull_back and not effect.carried
 
 
 @checked()

@@ -1,6 +1,5 @@
 """A config for a robot of which only the URDF is known: `excite init`."""
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal, cast
@@ -12,7 +11,7 @@ from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import ConfigError, RobotError, nearest
 from excite_cli.proposal.cell import Cell
 from excite_cli.proposal.joints import choose_joints, limbs
-from excite_cli.proposal.propose import Proposal, Request
+from excite_cli.proposal.propose import Proposal, Request, path_from
 from excite_cli.proposal.propose import propose as propose_config
 from excite_cli.robot.allowed_files import FolderRequest as FolderRequest
 from excite_cli.robot.description import EXAMPLE_PREFIX, example_robots, is_named
@@ -69,7 +68,6 @@ def _urdf(robot: str) -> str:
 
 
 Base = Literal["fixed", "floating"]
-_FARTHEST = 3  # folders upwards, for which a path is still told as a relative one
 
 
 @checked()
@@ -169,8 +167,8 @@ def save_proposal(
     path = Path(f"{name}.yaml") if output is None else Path(output)
     with held({"output": path}, overwrite, () if known else (robot,)):
         folder = path.resolve().parent
-        source = str(robot) if known else _from(Path(robot), folder)
-        dirs = tuple(_from(Path(each), folder) for each in package_dirs)
+        source = str(robot) if known else path_from(folder, Path(robot).resolve())
+        dirs = tuple(path_from(folder, Path(each).resolve()) for each in package_dirs)
         # A wrong name is reported at once, and what may be read is asked first.
         _, needed = load_with_folders(source, dirs, folder, xacro_args, allow)
         allowed = {each.folder for each in needed}
@@ -205,9 +203,3 @@ def limbs_of(
     dirs = tuple(map(str, package_dirs))
     description, _ = load_with_folders(robot, dirs, Path.cwd(), xacro_args, allow)
     return limbs(choose_joints(survey(description).joints, robot).chosen)
-
-
-def _from(urdf: Path, folder: Path) -> str:
-    """The URDF's path as the config in `folder` says it: relative where it is near."""
-    relative = os.path.relpath(urdf.resolve(), folder)
-    return str(urdf.resolve()) if relative.count("..") > _FARTHEST else relative

@@ -137,7 +137,7 @@ def draw_motion(
             content = still_png(problem, segment, look, time, saying(tell))
         else:
             content = film.drawn(problem, segment, look, progress, workers, tell)
-        write_atomically(path, lambda temporary: _fill(temporary, content))
+        write_atomically(path, lambda temporary: temporary.write_bytes(content))
     return Drawing(
         path,
         segment.name,
@@ -200,10 +200,6 @@ def _check_size(size: tuple[int, int]) -> None:
             f"--size {size[0]}x{size[1]}: give WIDTHxHEIGHT in pixels, {_SMALLEST} to {_LARGEST}: "
             "1280x960."
         )
-
-
-def _fill(path: Path, content: bytes) -> None:
-    path.write_bytes(content)
 
 
 def _on_their_robot(

@@ -186,7 +186,4 @@ def _date(nanoseconds: int) -> str:
 
 
 def _copy(source: Path, target: Path) -> None:
-    def write(path: Path) -> None:
-        shutil.copyfile(source, path)
-
-    write_atomically(target, write)
+    write_atomically(target, lambda temporary: shutil.copyfile(source, temporary))

@@ -221,7 +221,7 @@ def _end_whatever_comes(program: _Supervised, job: Job, held: Held) -> ProgramEx
 def _ended_without_supervisor(program: _Supervised, job: Job, held: Held) -> ProgramExit:
     """End what can be found of a program that has lost its supervisor."""
     folder = Path(job.log).parent
-    ending = Escalation(lambda: left_in(folder), session_of(folder), job.grace)
+    ending = Escalation(lambda: left_in(folder), _noted(folder)[0], job.grace)
     before = min(held.count, 1)
     ending.request()
     while left_in(folder) and not ending.in_vain:
@@ -274,11 +274,6 @@ def left_in(folder: Path) -> list[Process]:
     if session:
         found.update((each.pid, each) for each in of_session(session, start))
     return list(found.values())
-
-
-def session_of(folder: Path) -> int:
-    """The session, and group, of the program that was started last; 0 where it is not known."""
-    return _noted(folder)[0]
 
 
 def _noted(folder: Path) -> tuple[int, int]:

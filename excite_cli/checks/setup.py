@@ -4,11 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
+from excite_cli.arrays import Indices, Mask
 from excite_cli.identification.prepare import PreparedRun
-from excite_cli.measurement.dataset import Mask
 from excite_cli.robot.model import Array, Robot
 
 # What checks look at: some instants of all runs, filtered as every fit filters them.
@@ -76,7 +75,7 @@ def samples_of(runs: Sequence[PreparedRun], most: int, clocked: bool = False) ->
     return replace(whole, moves=whole.moves & judged).thinned(most)
 
 
-Order = NDArray[np.intp]
+Order = Indices
 
 
 @dataclass(frozen=True)

@@ -37,11 +37,6 @@ from excite_cli.cli.view import view
 _RENAMED = {"sealed": "held-out"}  # options of version 0.2, which scripts may still give
 
 
-def _of_today(word: str) -> str:
-    """The name that an option has today."""
-    return _RENAMED.get(word, word)
-
-
 app = typer.Typer(
     name="excite",
     cls=HelpfulGroup,
@@ -55,7 +50,7 @@ app = typer.Typer(
     context_settings={
         "help_option_names": ["-h", "--help"],
         "max_content_width": 100,
-        "token_normalize_func": _of_today,
+        "token_normalize_func": lambda word: _RENAMED.get(word, word),
     },
 )
 

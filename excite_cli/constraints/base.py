@@ -15,8 +15,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array as Array
+from excite_cli.arrays import Indices as Indices
 from excite_cli.constraints.drawing import Drawable
 
 if TYPE_CHECKING:
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
     from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty
     from excite_cli.proof.enclosed_motion import EnclosedMotion
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 Parts = tuple[Array | None, ...]
 """Derivatives (K, n) of K margins by q, v, a and, of members that bound it, jerk."""
 

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Mask
 from excite_cli.config.constraints_spec import JointLimitsSpec
 from excite_cli.constraints.base import Array, Constraint, Indices, Parts, part_of
 from excite_cli.constraints.joint_columns import JointColumns, Quantity
@@ -16,8 +16,6 @@ from excite_cli.errors import ConfigError
 from excite_cli.measurement.motors import Motors
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.robot.model import Robot
-
-Mask = NDArray[np.bool_]
 
 _TITLES = ("Joint position to its limit", "Joint speed to its limit",
            "Joint acceleration to its limit", "Joint jerk to its limit")  # fmt: skip

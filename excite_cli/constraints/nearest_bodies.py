@@ -3,15 +3,14 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array
 from excite_cli.constraints.drawing import NearestBodies
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.geometry.obstacles import Obstacle
 from excite_cli.geometry.world_segments import nearest_points, normals
 from excite_cli.robot.capsule import Capsule
 
-Array = NDArray[np.float64]
 Ends = tuple[Array, Array]
 Pairs = Sequence[tuple[int, int]]
 

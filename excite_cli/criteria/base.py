@@ -10,12 +10,11 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from excite_cli.arrays import Array as Array
 
 if TYPE_CHECKING:
     from excite_cli.config.spec import CriterionSpec
-
-Array = NDArray[np.float64]
 
 # p of the smooth stand-ins of a criterion with corners, one after the other.
 SHARPNESS = (4.0, 16.0, 64.0, 256.0, 1024.0)
@@ -33,6 +32,8 @@ class Criterion(ABC):
     """Starts of a motion where the config gives no number."""
     tolerance: float = 1e-3
     """Change of log f over 8 iterations that ends a start, where the config gives none."""
+    smooth: bool = True
+    """Whether f is differentiable where singular values meet."""
     compares_columns: bool = False
     """Whether it is about columns beside each other, so that one alone says nothing."""
 
@@ -48,11 +49,6 @@ class Criterion(ABC):
     @abstractmethod
     def derivative(self, sigma: Array) -> Array:
         """∂f/∂σ (r,)."""
-
-    @property
-    def smooth(self) -> bool:
-        """Whether f is differentiable where singular values meet."""
-        return True
 
     def continuation(self) -> tuple[Criterion, ...]:
         """Criteria to minimise one after the other, each a closer stand-in for this one."""

@@ -17,6 +17,7 @@ class ConditionAndSigmaMin(Criterion):
     """log((σ_max + 1) / σ_min)."""
 
     name = "condition_and_sigma_min"
+    smooth = False  # extreme singular values meet at good optima
     compares_columns = True
 
     def value(self, sigma: Array) -> float:
@@ -29,11 +30,6 @@ class ConditionAndSigmaMin(Criterion):
         derivative[0] += 1.0 / (sigma[0] + 1.0)
         derivative[-1] -= 1.0 / sigma[-1]
         return derivative
-
-    @property
-    def smooth(self) -> bool:
-        """Extreme singular values meet at good optima."""
-        return False
 
     def continuation(self) -> tuple[Criterion, ...]:
         """Smooth forms with rising p."""

@@ -10,6 +10,7 @@ class ConditionNumber(Criterion):
     """log cond; not differentiable where the extreme singular values meet."""
 
     name = "condition_number"
+    smooth = False  # extreme singular values meet at good optima
     compares_columns = True
 
     def value(self, sigma: Array) -> float:
@@ -22,11 +23,6 @@ class ConditionNumber(Criterion):
         derivative[0] += 1.0 / sigma[0]
         derivative[-1] -= 1.0 / sigma[-1]
         return derivative
-
-    @property
-    def smooth(self) -> bool:
-        """Extreme singular values meet at good optima."""
-        return False
 
     def continuation(self) -> tuple[Criterion, ...]:
         """Smooth forms with rising p."""

@@ -12,6 +12,7 @@ class SigmaMin(Criterion):
     """−log σ_min; not differentiable where the smallest singular values meet."""
 
     name = "sigma_min"
+    smooth = False  # the smallest singular values meet at good optima
 
     def value(self, sigma: Array) -> float:
         """−log σ_min."""
@@ -22,11 +23,6 @@ class SigmaMin(Criterion):
         derivative = np.zeros_like(sigma)
         derivative[-1] = -1.0 / sigma[-1]
         return derivative
-
-    @property
-    def smooth(self) -> bool:
-        """The smallest singular values meet at good optima."""
-        return False
 
     def continuation(self) -> tuple[Criterion, ...]:
         """Smooth forms with rising p."""

@@ -13,10 +13,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array, Indices
 from excite_cli.diagnosis.schur import RIDGE
-from excite_cli.robot.model import Array
 
 _KEPT = 64  # models whose fits are kept
 
@@ -28,7 +27,7 @@ class _Fits:
     `exact`: not by a downdate, each of which costs digits.
     """
 
-    at: NDArray[np.intp]
+    at: Indices
     parameters: Array
     inverses: Array
     exact: bool = True
@@ -45,12 +44,12 @@ class Blocks:
 
     def __init__(
         self,
-        active: Sequence[NDArray[np.intp]],
+        active: Sequence[Indices],
         grams: Sequence[Array],
         total: Array,
-        columns: Callable[[Sequence[int]], NDArray[np.intp]],
-        own: Callable[[int], NDArray[np.intp]],
-        groups: NDArray[np.intp],
+        columns: Callable[[Sequence[int]], Indices],
+        own: Callable[[int], Indices],
+        groups: Indices,
         seen: bool = False,
     ) -> None:
         self._grams, self._columns, self._own = grams, columns, own
@@ -150,7 +149,7 @@ class Blocks:
         inverses = fits.inverses[:, kept[:, None], kept] - across @ steps[:, :, 1:]
         return _Fits(fits.at[kept], parameters, inverses, exact=False)
 
-    def _left(self, at: NDArray[np.intp], parameters: Array, joints: Sequence[int]) -> Array:
+    def _left(self, at: Indices, parameters: Array, joints: Sequence[int]) -> Array:
         """Of m models (m, n, B) with the columns `at` (k,) and `parameters` (G, m, k)."""
         found = np.empty((parameters.shape[1], len(joints), len(self.groups)))
         for row, joint in enumerate(joints):

@@ -18,13 +18,12 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from excite_cli.arrays import Array, Indices
 from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.training import BlocksOfTime, Columns, TrainingData
-from excite_cli.robot.model import Array
 
 _LEAST = 0.05  # of what is left of an average block
 # Fitted to one run alone the other is hardly predicted, the more so by a larger model: the KR300's
@@ -125,12 +124,12 @@ def _difference(before: Array, after: Array) -> Difference:
     return Difference(float(gained.sum()), error, blocks, joints)
 
 
-def _cut(data: TrainingData) -> tuple[BlocksOfTime, NDArray[np.intp]]:
+def _cut(data: TrainingData) -> tuple[BlocksOfTime, Indices]:
     """Blocks of a second, or longer ones of a long log, and the fold (B,) of each."""
     times = [run.averaged(run.t) for run in data.runs]
     whole = sum(float(t[-1] - t[0]) for t in times)
     length = max(SECONDS, whole / _MOST)
-    owner: list[NDArray[np.intp]] = []
+    owner: list[Indices] = []
     folds: list[int] = []
     for t, fold in zip(times, data.folds, strict=True):
         span = max(float(t[-1] - t[0]), 1e-12)
@@ -141,7 +140,7 @@ def _cut(data: TrainingData) -> tuple[BlocksOfTime, NDArray[np.intp]]:
     return BlocksOfTime(len(folds), tuple(owner)), np.array(folds)
 
 
-def _quarters_of_travel(data: TrainingData, blocks: BlocksOfTime) -> NDArray[np.intp]:
+def _quarters_of_travel(data: TrainingData, blocks: BlocksOfTime) -> Indices:
     """The part (B, n) of its travel in which each joint is in each block, on average."""
     sums, counts = np.zeros((blocks.count, data.n)), np.zeros(blocks.count)
     for run, block in zip(data.runs, blocks.owners, strict=True):

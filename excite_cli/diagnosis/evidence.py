@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array, Indices, Mask
 from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.blocks import Blocks, keep
 from excite_cli.diagnosis.schur import (
@@ -25,7 +25,6 @@ from excite_cli.diagnosis.schur import (
     Schur,
     gain_of_columns,
 )
-from excite_cli.robot.model import Array
 
 # Gram matrices per joint and block of time, of those columns only that show in the joint's rows.
 #
@@ -40,7 +39,7 @@ class JointGram:
     The torque is the last column of the blocks, and not among the `active`.
     """
 
-    active: NDArray[np.intp]
+    active: Indices
     blocks: Array
 
 
@@ -90,7 +89,7 @@ class Evidence:
         self,
         grams: Grams,
         fixed: int,
-        blocks: Sequence[NDArray[np.intp]],
+        blocks: Sequence[Indices],
         rows_of: Sequence[tuple[int, ...]],
         prior: Array,
         weighed: Array,
@@ -136,7 +135,7 @@ class Evidence:
         """Index of the torque's column."""
         return self.total.shape[0] - 1
 
-    def columns(self, chosen: Sequence[int]) -> NDArray[np.intp]:
+    def columns(self, chosen: Sequence[int]) -> Indices:
         """Columns of the declared model and the chosen candidates."""
         return np.concatenate([np.arange(self.fixed), *(self.blocks[i] for i in chosen)]).astype(
             np.intp
@@ -247,7 +246,7 @@ class Evidence:
         told = self._identified_by_prior_only(chosen, left)
         return Schur(self._candidates, (shared, solved), left, cross, told)
 
-    def _identified_by_prior_only(self, chosen: Sequence[int], left: Array) -> NDArray[np.bool_]:
+    def _identified_by_prior_only(self, chosen: Sequence[int], left: Array) -> Mask:
         """Columns of candidates of which next to nothing is left without what was weighed.
 
         `left` is of each with it. Candidates have the same norms without it.
@@ -259,13 +258,13 @@ class Evidence:
         told = (left > SHARED * own) & (left > _BY_WEIGHT * by_data)
         return np.asarray(told & (by_data < ABSORBED * own))
 
-    def folds_of(self, candidates: Sequence[int]) -> NDArray[np.bool_]:
+    def folds_of(self, candidates: Sequence[int]) -> Mask:
         """Folds (F,) in which one of some candidates is there."""
         columns = np.concatenate([self.blocks[i] for i in candidates])
         return np.asarray(self._there[:, columns].any(axis=1))
 
     @cached_property
-    def _there(self) -> NDArray[np.bool_]:
+    def _there(self) -> Mask:
         """Which columns (F, K) are there in which fold."""
         energies = self._on_sides[::2] + self._on_sides[1::2]
         return np.asarray(energies > _THERE * energies.sum(axis=0))
@@ -297,13 +296,11 @@ class Evidence:
         every = [each.sum(axis=0)[None] for each in self._normalised]
         return self._blocks(every, np.zeros(1, dtype=np.intp), seen=True)
 
-    def in_groups(self, groups: NDArray[np.intp]) -> Blocks:
+    def in_groups(self, groups: Indices) -> Blocks:
         """All blocks, those of one of the `groups` (B,) fitted to the others."""
         return self._blocks(self._normalised, groups)
 
-    def _blocks(
-        self, grams: Sequence[Array], groups: NDArray[np.intp], seen: bool = False
-    ) -> Blocks:
+    def _blocks(self, grams: Sequence[Array], groups: Indices, seen: bool = False) -> Blocks:
         own = self.blocks.__getitem__
         return Blocks(self.grams.active, grams, self.total, self.columns, own, groups, seen)
 

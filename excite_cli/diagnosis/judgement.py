@@ -192,10 +192,6 @@ class Judgement:
         single = chi2.sf(gain.chi2 / self.rules.inflation, gain.dof)
         return float(min(1.0, self.candidates[candidate].tests * single))
 
-    def reported_p_value(self, candidate: int, gain: Gain) -> float:
-        """As `p_value`, but no smaller than the placebos back."""
-        return max(self.p_value(candidate, gain), self.rules.least_p)
-
     def left_out_gain(self, chosen: Sequence[int], added: Sequence[int]) -> float:
         """Share by which the RMS error of blocks left out falls, on the rows that `added` touches.
 

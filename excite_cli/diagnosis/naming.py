@@ -161,7 +161,7 @@ def named_effects(
             parameters=effect.report_on(
                 robot.sliding, seen @ values, seen @ final.covariance[own, own] @ seen.T
             ),
-            p_value=judge.reported_p_value(i, gain),
+            p_value=max(judge.p_value(i, gain), judge.rules.least_p),  # which the placebos back
             share_of_residual=float(np.clip(share, 0.0, 1.0)),
             gain=float(judge.left_out_gain(rest, [i])),
             aliases=tuple(record for _, record in aliases),

@@ -137,7 +137,8 @@ def plan_after(
             shape = dict(effect.shape)
             planned.append(EffectSpec(kind=effect.kind, joints=record.joints, shape=shape))
     columns = DataColumns(diagnosis, robot, find_base_parameters(robot).rank)
-    spec, of_work = spec.model_copy(update={"effects": tuple(planned)}), _of_work(spec)
+    of_work = build_criterion(spec.criterion).of_work
+    spec = spec.model_copy(update={"effects": tuple(planned)})
     pairs, wide, plain = _alias_pairs(diagnosis), None, spec
     if of_work:  # effects that are only possible are no part of a model that is taken apart
         criterion = spec.criterion.model_copy(update={"kind": "condition_number"})
@@ -180,10 +181,6 @@ def _reweighted(asked: CriterionSpec) -> list[str]:
             "length 1, effects among them: not comparable with those of motions planned before"
         )
     return said
-
-
-def _of_work(spec: Spec) -> bool:
-    return build_criterion(spec.criterion).of_work
 
 
 def _weighted(diagnosis: Diagnosis, spec: Spec, robot: Robot) -> Spec:

@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from excite_cli.robot.model import Array
+from excite_cli.arrays import Array, Indices, Mask
 
 HIGHEST_ORDER = 12
 _SHRINK = 0.995  # roots are kept within this circle
@@ -39,11 +38,11 @@ class NoiseModel:
         """Independent samples."""
         return cls(tuple(np.zeros(0) for _ in sigma), np.asarray(sigma, dtype=float))
 
-    def whitened(self, x: Array, joint: int, usable: NDArray[np.bool_]) -> Array:
+    def whitened(self, x: Array, joint: int, usable: Mask) -> Array:
         """The usable rows (K, …) of x (M, …), a run's rows of one joint, with unit innovations."""
         return self.whitening(joint, usable)(x)
 
-    def whitening(self, joint: int, usable: NDArray[np.bool_]) -> "Whitening":
+    def whitening(self, joint: int, usable: Mask) -> "Whitening":
         """How the usable rows of a run's columns of one joint are whitened.
 
         Of each what those of the p rows before it that are usable do not predict. Where a joint
@@ -70,7 +69,7 @@ class NoiseModel:
             spread[self.follow_gaps(usable)] *= self.after_gaps[joint]
         return Whitening(self.coefficients[joint], at, tuple(after), spread)
 
-    def follow_gaps(self, usable: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def follow_gaps(self, usable: Mask) -> Mask:
         """Which of the usable rows (K,) follow a gap, or the start, within the highest order."""
         order = max(len(c) for c in self.coefficients)
         touched = np.convolve(~usable, np.ones(order + 1))[: len(usable)] > 0.5
@@ -82,7 +81,7 @@ class NoiseModel:
         """Many runs have the same gaps."""
         return {}
 
-    def _predictor(self, joint: int, lags: NDArray[np.intp]) -> tuple[Array, float]:
+    def _predictor(self, joint: int, lags: Indices) -> tuple[Array, float]:
         """Coefficients of the samples at these lags, and the standard deviation of what is left."""
         key = joint, lags.tobytes()
         if key not in self._predictors:
@@ -120,8 +119,8 @@ class Whitening:
     """
 
     coefficients: Array
-    at: NDArray[np.intp]
-    after: tuple[tuple[NDArray[np.intp], NDArray[np.intp], Array], ...]
+    at: Indices
+    after: tuple[tuple[Indices, Indices, Array], ...]
     spread: Array
 
     def __call__(self, x: Array) -> Array:
@@ -139,7 +138,7 @@ class Whitening:
         return rest
 
 
-def fit_noise(residuals: Sequence[Array], usable: Sequence[NDArray[np.bool_]]) -> NoiseModel:
+def fit_noise(residuals: Sequence[Array], usable: Sequence[Mask]) -> NoiseModel:
     """Autoregressions for residuals (M, n) of several runs, and what is more after gaps."""
     joints = range(residuals[0].shape[1])
     found = [
@@ -152,7 +151,7 @@ def fit_noise(residuals: Sequence[Array], usable: Sequence[NDArray[np.bool_]]) -
 
 
 def _after_gaps(
-    model: NoiseModel, residuals: Sequence[Array], usable: Sequence[NDArray[np.bool_]], joint: int
+    model: NoiseModel, residuals: Sequence[Array], usable: Sequence[Mask], joint: int
 ) -> float:
     """Innovations after gaps over all others, root mean squares; `_AFTER_GAPS` at least."""
     pairs = list(zip(residuals, usable, strict=True))
@@ -163,7 +162,7 @@ def _after_gaps(
     return float(max(_AFTER_GAPS, np.sqrt(np.mean(rows[near] ** 2) / np.mean(rows[~near] ** 2))))
 
 
-def _autoregression(series: list[Array], usable: list[NDArray[np.bool_]]) -> tuple[Array, float]:
+def _autoregression(series: list[Array], usable: list[Mask]) -> tuple[Array, float]:
     shortest = min(len(s) for s in series)
     most = int(min(HIGHEST_ORDER, max(0, shortest // 8)))
     rows, targets = [], []

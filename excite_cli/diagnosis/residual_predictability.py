@@ -18,14 +18,13 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.blas import dsymv
 from scipy.linalg.lapack import dpotrf, dpotri
 
+from excite_cli.arrays import Array, Indices, Mask
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.training import TrainingData
 from excite_cli.effects.base import Signals
-from excite_cli.robot.model import Array
 from excite_cli.workers.base import Tell
 from excite_cli.workers.context import each
 
@@ -85,7 +84,7 @@ class Rest:
 
     joint: str
     residual: Array
-    block: NDArray[np.intp]
+    block: Indices
     direction: Array
     kernels: Mapping[Covariate, Array]
 
@@ -142,7 +141,7 @@ class Rest:
         return float(np.sum(errors**2))
 
     @cached_property
-    def _seconds(self) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    def _seconds(self) -> tuple[Indices, Mask]:
         """Samples (B, w) of every second, those of fewer than w filled up; which ones are there."""
         starts, counts = np.unique(self.block, return_index=True, return_counts=True)[1:]
         order = np.arange(counts.max())
@@ -223,7 +222,7 @@ class Quantities:
         yield Covariate("position", own, True), [x[:, joint] for x in self._past_q]
         yield Covariate("load", own, True), [x[:, joint] for x in self._past_load]
 
-    def _rows(self, joint: int) -> tuple[list[NDArray[np.intp]], NDArray[np.intp]]:
+    def _rows(self, joint: int) -> tuple[list[Indices], Indices]:
         """Samples of every part, and the second that each of them is in (all parts in a row).
 
         Of long data whole stretches are left out, evenly: neighbours in time must stay.

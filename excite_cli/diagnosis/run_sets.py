@@ -14,9 +14,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.cluster.hierarchy import linkage
 
+from excite_cli.arrays import Mask
 from excite_cli.robot.model import Array
 
 MOST = 6  # sets that become candidates
@@ -25,8 +25,6 @@ _LEAST = 25.0  # what a set must explain, in units of the squared median of what
 _MOST_STEPS = 60
 _RIDGE = 1e-9
 _CLIMBS = 3  # best sets that are improved run by run
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotrs
 
-from excite_cli.robot.model import Array
+from excite_cli.arrays import Array, Indices, Mask
 
 # Cholesky factors of the many small normal matrices of a search, by LAPACK itself.
 #
@@ -64,7 +63,7 @@ class OneShape:
     """
 
     candidates: list[int]
-    columns: NDArray[np.intp]
+    columns: Indices
     bases: Array
     grams: Array
 
@@ -72,7 +71,7 @@ class OneShape:
 class CandidateBases:
     """Columns of candidates in the normalised Gram matrix of all."""
 
-    def __init__(self, total: Array, fixed: int, blocks: list[NDArray[np.intp]]) -> None:
+    def __init__(self, total: Array, fixed: int, blocks: list[Indices]) -> None:
         self.total, self.fixed, self.blocks = total, fixed, blocks
         self._bases: dict[int, Array] = {}
 
@@ -97,7 +96,7 @@ class CandidateBases:
             found.append(OneShape(several, at, bases, self.total[at[:, :, None], at[:, None]]))
         return found
 
-    def _basis(self, at: NDArray[np.intp]) -> Array:
+    def _basis(self, at: Indices) -> Array:
         values, vectors = np.linalg.eigh(self.total[np.ix_(at, at)])
         kept = values > _COLLINEAR * values[-1]
         return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
@@ -117,7 +116,7 @@ class Schur:
         products: tuple[Array, Array],
         diagonal: Array,
         cross: Array,
-        identified_by_prior_only: NDArray[np.bool_],
+        identified_by_prior_only: Mask,
     ) -> None:
         """`products` (k, p) are G_Sc and N⁻¹ G_Sc, `diagonal` and `cross` (p,) of Z and z.
 
@@ -127,7 +126,7 @@ class Schur:
         self._shared, self._solved = products
         self._told = identified_by_prior_only
 
-    def block(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> Array:
+    def block(self, rows: Indices, columns: Indices) -> Array:
         """What is left (r, c) of some candidates' columns, counted from the first candidate's."""
         e = self._candidates
         own = e.total[np.ix_(rows + e.fixed, columns + e.fixed)]

@@ -215,7 +215,8 @@ class CandidateSearch:
             then = self._moved(chosen, {move: -saved for move, saved in known.values()})
             if known and self.judge.cost(then) < before - _LOWER:
                 changed = {j for i in {*chosen} ^ {*then} for j in self.candidates[i].rows}
-                tried = {i for i in tried if changed.isdisjoint(self._rows_known(i, known))}
+                moves = {i: known[i][0] if i in known else (i, ()) for i in tried}
+                tried = {i for i in tried if changed.isdisjoint(self._rows_of_move(moves[i]))}
                 known = {i: each for i, each in known.items() if i in tried}
                 chosen = then
             elif fresh:
@@ -234,11 +235,8 @@ class CandidateSearch:
         one = _with_move(chosen, *min(moves, key=moves.__getitem__))
         return min(one, several, key=self.judge.cost) if len(several) <= self._most else one
 
-    def _rows_known(self, i: int, known: Mapping[int, tuple[_Move, float]]) -> set[int]:
-        """Joints on which a member is, or who may come in its place."""
-        return self._rows_of_move(known[i][0] if i in known else (i, ()))
-
     def _rows_of_move(self, move: _Move) -> set[int]:
+        """Joints on which a member is, or who may come in its place."""
         member, instead = move
         return {j for i in (member, *instead) for j in self.candidates[i].rows}
 

@@ -13,15 +13,14 @@ left out of the same recordings miss it, and is then beside both models that are
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array, Indices
 from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.comparison import ModelComparison
 from excite_cli.diagnosis.extrapolation import torque_seen
 from excite_cli.diagnosis.search import weakest_apart
 from excite_cli.diagnosis.search_result import SearchResult
 from excite_cli.diagnosis.textbook import everyday
-from excite_cli.robot.model import Array
 
 # What every robot has stays in the model, unless the model says the same without it.
 #
@@ -100,7 +99,7 @@ class _Elsewhere:
         traced, white = self._traced, self._traced.judge.white
         theta = traced.judge.plain.solve(chosen)
         covariance = traced.inflation * white.covariance(chosen)
-        at: NDArray[np.intp] = np.array([self._place[int(c)] for c in white.columns(chosen)])
+        at: Indices = np.array([self._place[int(c)] for c in white.columns(chosen)])
         usual = self._usual[:, at[:, None], at]
         start, found = white.fixed, {}
         for i in chosen:
@@ -138,7 +137,9 @@ def sufficient(traced: SearchResult, models: ModelComparison) -> list[int]:
     every, found = (with_everyday(traced, some) for some in (traced.chosen, kept))
     if models.difference(found, every).better:
         found = every
-    best, larger = sorted((plain, found), key=lambda some: _width(traced, some))
+    best, larger = sorted(
+        (plain, found), key=lambda some: sum(traced.candidates[i].width for i in some)
+    )
     gained = models.difference(best, larger)
     if gained.better and gained.of_error > np.log(rules.AS_GOOD):
         best = larger
@@ -178,8 +179,3 @@ def _of_single_runs(
             or models.missed(found, judge.without(i, found), traced.candidates[i].rows)
         )
     ]
-
-
-def _width(traced: SearchResult, some: Sequence[int]) -> int:
-    """Number of parameters."""
-    return sum(traced.candidates[i].width for i in some)

@@ -6,15 +6,14 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array, Indices, Mask
 from excite_cli.diagnosis.candidates import Candidate
 from excite_cli.diagnosis.evidence import Evidence, Grams, JointGram
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.identification.covariance import RunRows
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.out_of_core import Spool, forget
-from excite_cli.robot.model import Array
 from excite_cli.workers.base import Tell
 from excite_cli.workers.context import each
 
@@ -121,11 +120,11 @@ class TrainingData:
             for joint in range(self.n)
         ]
 
-    def _starts(self, candidates: Sequence[Columns]) -> NDArray[np.intp]:
+    def _starts(self, candidates: Sequence[Columns]) -> Indices:
         """Where the columns of every candidate begin among all, and where the last ones end."""
         return self.declared[0].shape[2] + np.cumsum([0, *(c.width for c in candidates)])
 
-    def _active(self, candidates: Sequence[Columns], joint: int) -> NDArray[np.intp]:
+    def _active(self, candidates: Sequence[Columns], joint: int) -> Indices:
         """Columns (A,) of the declared model and of the candidates in the rows of a joint."""
         starts = self._starts(candidates)
         there = [i for i, c in enumerate(candidates) if joint in c.rows]
@@ -135,7 +134,7 @@ class TrainingData:
 
     def _rows_of(
         self, candidates: Sequence[Columns], joint: int, part: int
-    ) -> tuple[list[Array], NDArray[np.bool_]]:
+    ) -> tuple[list[Array], Mask]:
         """Columns (M, …) of one joint's rows in a part, torque last; which rows are usable (M,)."""
         touching = [c for c in candidates if joint in c.rows]
         columns = [
@@ -175,12 +174,12 @@ class BlocksOfTime:
     """Which of `count` blocks every sample (M,) of every part is in."""
 
     count: int
-    owners: tuple[NDArray[np.intp], ...]
+    owners: tuple[Indices, ...]
 
 
 def _blocks_of(
     shared: tuple[int, NoiseModel],
-    task: tuple[int, Sequence[tuple[list[Array], NDArray[np.bool_], NDArray[np.intp]]]],
+    task: tuple[int, Sequence[tuple[list[Array], Mask, Indices]]],
     tell: Tell,
 ) -> Array:
     """Gram matrices (B, A + 1, A + 1) of the whitened rows of one joint in some parts."""
@@ -211,7 +210,7 @@ def _residual(
     return np.asarray(residual)
 
 
-def _sides(t: Array) -> NDArray[np.intp]:
+def _sides(t: Array) -> Indices:
     """Side 0 or 1 (M,) of every sample."""
     span = float(t[-1] - t[0])
     block = max(min(_BLOCK, span / _FEWEST_BLOCKS), 1e-12)

@@ -16,14 +16,13 @@ x is, they outweigh these by far. Nothing is imagined for a part of the textbook
 from collections.abc import Collection, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array, Indices
 from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.schur import RIDGE, Cholesky
 from excite_cli.diagnosis.training import Columns, TrainingData
 from excite_cli.identification.least_squares import EXACT
-from excite_cli.robot.model import Array
 
 _ROUNDS, _SETTLED = 30, 1e-6
 _ROUNDING = 1e-14  # of the largest eigenvalue
@@ -141,7 +140,7 @@ def _less(gram: Array, free: int, held: Array) -> Array:
     return np.asarray(change.T @ gram @ change) if len(held) else gram
 
 
-def _solved(prior: Array, own: Sequence[tuple[NDArray[np.intp], Array]], sigma: Array) -> Array:
+def _solved(prior: Array, own: Sequence[tuple[Indices, Array]], sigma: Array) -> Array:
     """The least-squares solution, joints weighed by `sigma`."""
     if len(prior) == 1:  # the torque's column alone
         return np.zeros(0)

@@ -118,7 +118,7 @@ def _partials(
         KA = K @ inverses[i]
         hat = np.zeros((len(Z), 6, 6))
         for j in block.subtree:
-            Zij = Z[:, block.rows, _columns(j)]
+            Zij = Z[:, block.rows, 10 * (j - 1) : 10 * j]
             at_world = _transpose(KA) @ Zij
             by_body[j] += _transpose(transforms[j]) @ at_world
             by_transform[j] += at_world @ _transpose(bodies[j])
@@ -232,10 +232,6 @@ def _row_blocks(robot: Robot, joints: list[Joint]) -> Iterator[_RowBlock]:
             yield _RowBlock(
                 i, slice(int(rows[0]), int(rows[-1]) + 1), projection, tuple(subtrees[i])
             )
-
-
-def _columns(j: int) -> slice:
-    return slice(10 * (j - 1), 10 * j)
 
 
 def _transpose(matrix: Array) -> Array:

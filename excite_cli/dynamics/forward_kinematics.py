@@ -13,21 +13,19 @@ from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array, Indices
 from excite_cli.kernels.compiled import KERNELS
 from excite_cli.robot.model import Robot
 from excite_cli.trajectory.base import Trajectory
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class _Level:
     """Joints of equal depth: body numbers (joint index - 1), and those of their parents."""
 
-    bodies: NDArray[np.intp]
-    parents: NDArray[np.intp]  # -1: the world
+    bodies: Indices
+    parents: Indices  # -1: the world
 
 
 class BatchKinematics:

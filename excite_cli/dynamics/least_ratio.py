@@ -12,10 +12,9 @@ iteration from the middle value comes down to its root and gains digits quadrati
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array, Indices, Mask
 from excite_cli.dynamics.uncertain_inertias import InertiaUncertainty, Piece
-from excite_cli.robot.model import Array
 
 _ITERATIONS, _SETTLED = 30, 1e-12
 
@@ -44,9 +43,7 @@ class _Seen:
             slack = slack + np.linalg.norm(functionals @ self.axes, axis=-1)
         return np.asarray(self.middle @ functionals.T - slack)
 
-    def least_ratio(
-        self, above: Array, below: Array, floor: float
-    ) -> tuple[Array, NDArray[np.bool_]]:
+    def least_ratio(self, above: Array, below: Array, floor: float) -> tuple[Array, Mask]:
         """The least quotient (T, m) and where it is proper; see `least_ratios`."""
         middle, divisor = self.middle @ above.T, (self.middle @ below)[:, None]
         corners, corners_below = above @ self.corners, (below @ self.corners)[:, None]
@@ -80,13 +77,13 @@ class Ratios:
     """
 
     values: Array
-    pieces: NDArray[np.intp]
-    proper: NDArray[np.bool_]
+    pieces: Indices
+    proper: Mask
 
 
 def least_values(
     uncertainty: InertiaUncertainty, rows: Array, functionals: Array
-) -> tuple[Array, NDArray[np.intp]]:
+) -> tuple[Array, Indices]:
     """The least of a·r φ, and the piece that says so, each (T, m).
 
     Parameters
@@ -117,7 +114,7 @@ def least_ratios(
     return Ratios(values.max(axis=0), pieces, np.take_along_axis(proper, pieces[None], 0)[0])
 
 
-def worst_inertias(uncertainty: InertiaUncertainty, y: Array, pieces: NDArray[np.intp]) -> Array:
+def worst_inertias(uncertainty: InertiaUncertainty, y: Array, pieces: Indices) -> Array:
     """φ* (K, P) of functionals y (K, P), each with the piece (K,) that bounds it."""
     phi = np.empty_like(y)
     for index in np.unique(pieces):

@@ -21,13 +21,12 @@ sums over the bodies of B that joint l carries, and j < l meaning that l is furt
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Indices
 from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint, motion_cross
 from excite_cli.robot.link_frame import carried_bodies
 from excite_cli.robot.model import Array, Robot
 
-Indices = NDArray[np.intp]
 Derivatives = tuple[Array, Array, Array]
 Vectors = tuple[Array, Array]  # linear and angular part, each with its three components first
 

@@ -29,13 +29,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Indices
 from excite_cli.dynamics.forward_kinematics import BatchKinematics
 from excite_cli.kernels.compiled import KERNELS
 from excite_cli.robot.model import Array, Robot
-
-Indices = NDArray[np.intp]
 
 # [ω•]: I ω = [ω•] (Ixx, Ixy, Iyy, Ixz, Iyz, Izz); _INERTIA[k] is the matrix for ω = e_k.
 _INERTIA = np.zeros((3, 3, 6))

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
-from excite_cli.effects.base import Effect, Parameter, Signals, Tier, steps_by_ratio
+from excite_cli.effects.base import Effect, Parameter, Signals, Tier
 from excite_cli.effects.mechanism import real
 from excite_cli.effects.parameter import whole_share
 from excite_cli.effects.simulated_robot import SimulatedRobot, Transmission, rotor_inertia
@@ -35,7 +35,6 @@ from excite_cli.robot.model import Array, Robot
 
 _GAPS = 1e-3, 3e-2  # rad
 _MISSED = 0.04  # of the share, one standard deviation; measured on simulated arms
-_FINER = (1.15, 1.06, 1.02, 1.007)
 _WIDTH = 0.01  # s, of a blow in the search, about that of a filter of 20 Hz
 _FINE = 2e-3  # s, the step in which flights are followed
 _CHUNK = 256  # samples that are looked at first for the end of a flight
@@ -53,8 +52,10 @@ class Backlash(Effect):
     over_time: ClassVar = True
     title: ClassVar = "backlash of the gear"
     signature: ClassVar = "when the load changes sign it is missing for a while, then comes a blow"
+    in_all_rows: ClassVar = True
     parameters: ClassVar = (whole_share("share"),)
     shapes: ClassVar = (Parameter("gap", "rad", *_GAPS),)
+    finer_ratios: ClassVar = (1.15, 1.06, 1.02, 1.007)  # a flight more or less changes much
     tier: ClassVar = Tier.LAST
     excludes: ClassVar = ("elasticity",)  # which it is, with a dead zone
     known_by: ClassVar = "gap"
@@ -100,10 +101,6 @@ class Backlash(Effect):
         """What the unknown way in which flanks meet makes of the share."""
         return _MISSED * values
 
-    def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
-        """Small ones: a flight more or less changes much."""
-        return steps_by_ratio(self.shape[name], _FINER)
-
     def build_into(
         self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
     ) -> None:
@@ -112,10 +109,6 @@ class Backlash(Effect):
         for j in self.joints:
             rotor = rotor_inertia(robot, j, given)
             robot.soft[j] = Transmission(rotor, given > 0.0, play=numbers["gap"])
-
-    def rows(self, n: int) -> tuple[int, ...]:
-        """All joints."""
-        return tuple(range(n))
 
     def columns(self, signals: Signals) -> Array:
         """Flights, blows, and the shift of the link, in all rows, (T, n, 1)."""

@@ -73,6 +73,7 @@ class Effect(Judgement, Mechanism, Presentation, ABC):
     shapes: ClassVar[tuple[Parameter, ...]] = ()
     per_run: ClassVar[bool] = False  # present in some runs only: looked for in each on its own
     can_appear_later: ClassVar[bool] = False  # from one day on a robot may have it, or more of it
+    in_all_rows: ClassVar[bool] = False  # its torque shows in every joint, not in its own alone
     of_campaign: ClassVar[bool] = False  # its columns look at the campaign's clock
     # Looked for once for every declared column of the log; its grid sees signals with that alone.
     follows_covariate: ClassVar[bool] = False
@@ -148,7 +149,7 @@ class Effect(Judgement, Mechanism, Presentation, ABC):
 
     def rows(self, n: int) -> tuple[int, ...]:
         """Moved joints in whose torque it shows."""
-        return self.joints
+        return tuple(range(n)) if self.in_all_rows else self.joints
 
     @abstractmethod
     def columns(self, signals: Signals) -> Array:

@@ -27,7 +27,6 @@ from excite_cli.robot.model import Array, Robot
 
 _CELLS = 96  # per run, for the search of the window
 _SHORTEST = 0.1  # s: what is shorter is a blow or a fault of the record
-_FINER = (1.35, 1.15, 1.06, 1.02)
 _LEAST = 0.1  # N
 _LONGEST = 0.5  # of the run; what lasts longer is no touch
 
@@ -83,7 +82,8 @@ class Contact(Effect):
 
     def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
         """Parts of the window's length."""
-        return steps_by_ratio(max(abs(self.shape["end"] - self.shape["start"]), 0.05), _FINER)
+        length = max(abs(self.shape["end"] - self.shape["start"]), 0.05)
+        return steps_by_ratio(length, self.finer_ratios)
 
     def build_into(
         self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]

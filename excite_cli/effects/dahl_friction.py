@@ -41,7 +41,6 @@ from excite_cli.effects.base import (
     Parameter,
     Signals,
     Value,
-    steps_by_ratio,
 )
 from excite_cli.effects.mechanism import real
 from excite_cli.effects.sign import WIDTH, sign_width, smooth_sign, smooth_sign_slope
@@ -58,7 +57,6 @@ _RATIOS = 0.5, 0.8, 1.25, 2.0  # of distance and damping at once, where there is
 # χ²: as for other parameters. Without it KR300's split A was left with 6.3 % for 5.8.
 _OF_DAMPING = 4.0
 _SHARES = np.geomspace(1e-3, 0.25, 7)  # of the range; neighbours overlap by 0.9
-_FINER = (1.4, 1.25, 1.15, 1.08, 1.03, 1.01)
 _STANDING = 0.01  # rad/s: less may be noise
 _SLIDING = 0.02  # rad/s at which a record that begins so fast has slid before
 _FORGOTTEN = 4.0  # distances
@@ -81,6 +79,8 @@ class DahlFriction(Effect):
         Parameter("distance", "rad", *_DISTANCES),
         Parameter("damping", "s/rad", 0.0, 20.0, nonnegative=True),
     )
+    # Where friction stands far above the noise, a few per cent of it are seen.
+    finer_ratios: ClassVar = (1.4, 1.25, 1.15, 1.08, 1.03, 1.01)
     defaults: ClassVar = {"distance": 0.03, "damping": 0.0}
     prior_cost: ClassVar = 2.0
     refines: ClassVar = ("coulomb_friction",)
@@ -100,10 +100,6 @@ class DahlFriction(Effect):
         travelled = max(x.max() for x in q) - min(x.min() for x in q) if q else 1.0
         distances = np.unique(np.clip(_SHARES * travelled, *_DISTANCES))
         return [{"distance": float(distance), "damping": 0.0} for distance in distances]
-
-    def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
-        """Many: where friction stands far above the noise, a few per cent of it are seen."""
-        return steps_by_ratio(self.shape[name], _FINER)
 
     def shapes_near(self, signals: Sequence[Signals]) -> list[dict]:
         """Without a damping, some with one; with one, none, and both shapes changed at once."""

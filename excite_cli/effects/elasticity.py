@@ -31,6 +31,7 @@ class Elasticity(Effect):
     over_time: ClassVar = True
     title: ClassVar = "elastic gear"
     signature: ClassVar = "the residual follows the fourth derivative of the motion, on many joints"
+    in_all_rows: ClassVar = True
     parameters: ClassVar = (Parameter("compliance", "rad/(N·m)", 1e-6, 1e-3, nonnegative=True),)
     tier: ClassVar = Tier.LAST
     excludes: ClassVar = ("backlash",)
@@ -62,10 +63,6 @@ class Elasticity(Effect):
             inertia = robot.link_inertia(j)
             damping = 2.0 * numbers["damping_ratio"] * np.sqrt(stiffness * inertia)
             robot.soft[j] = Transmission(rotor, given > 0.0, stiffness, float(damping))
-
-    def rows(self, n: int) -> tuple[int, ...]:
-        """All joints."""
-        return tuple(range(n))
 
     def columns(self, signals: Signals) -> Array:
         """−(∂τ/∂q_j τ_j + ∂τ/∂v_j dτ_j/dt + ∂τ/∂a_j d²τ_j/dt²), (T, n, 1)."""

@@ -23,6 +23,7 @@ class EncoderOffset(Effect):
     kind: ClassVar = "encoder_offset"
     title: ClassVar = "offset of an encoder"
     signature: ClassVar = "residuals on many joints as if one of them stood elsewhere"
+    in_all_rows: ClassVar = True
     parameters: ClassVar = (
         Parameter(
             "offset", "rad", 1e-3, 0.2, believed=(-0.2, 0.2),
@@ -41,10 +42,6 @@ class EncoderOffset(Effect):
     ) -> None:
         """What is recorded is the true angle less the offset."""
         robot.position_offset[list(self.joints)] -= values[0]
-
-    def rows(self, n: int) -> tuple[int, ...]:
-        """All joints."""
-        return tuple(range(n))
 
     def columns(self, signals: Signals) -> Array:
         """∂τ/∂q_j, (T, n, 1)."""

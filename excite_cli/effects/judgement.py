@@ -13,7 +13,8 @@ from math import inf
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+
+from excite_cli.arrays import Array, Mask
 
 if TYPE_CHECKING:
     from excite_cli.effects.base import Effect
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from excite_cli.effects.signals import Signals
 
 # How far several fitted parameters may be off by chance: lengths and distances in their errors.
-
-Array = NDArray[np.float64]
 
 
 # Chance of a true effect to look impossible by the error of the fit, and be refused.
@@ -53,7 +52,7 @@ def half_of(covariance: Array) -> Array:
     return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 1e-12)))
 
 
-def nearest_of_sign(values: Array, covariance: Array, signed: NDArray[np.bool_]) -> Array:
+def nearest_of_sign(values: Array, covariance: Array, signed: Mask) -> Array:
     """The nearest parameters (p,) of which those that are `signed` are not negative.
 
     minimise (x − values)ᵀ covariance⁻¹ (x − values) subject to x_k ≥ 0, a bounded least-squares
@@ -67,10 +66,6 @@ def nearest_of_sign(values: Array, covariance: Array, signed: NDArray[np.bool_])
         whiten, whiten @ values, (lower, np.full(len(values), np.inf)), method="bvls"
     )
     return np.asarray(np.where(signed & (found.x <= 1e-12 * np.abs(values)), 0.0, found.x))
-
-
-# By how much a shape parameter is changed, up and down, once its effect is found.
-_FINER = (1.35, 1.15, 1.06, 1.02)
 
 
 class Tier(IntEnum):
@@ -128,6 +123,9 @@ class Judgement:
 
     # Share of what it explains that may be lost where fitted numbers are moved to possible ones.
     projection_tolerance: ClassVar[float] = 0.0
+
+    # By how much a shape parameter is changed, up and down, once its effect is found.
+    finer_ratios: ClassVar[tuple[float, ...]] = (1.35, 1.15, 1.06, 1.02)
 
     # Linear parameters that are its size, by name; empty: all of them together.
     size: ClassVar[tuple[str, ...]] = ()
@@ -249,7 +247,7 @@ class Judgement:
 
         A grid names an effect, it does not measure it. Empty: the grid is all there is.
         """
-        return steps_by_ratio(self.shape[name], _FINER)
+        return steps_by_ratio(self.shape[name], self.finer_ratios)
 
     def shapes_near(self, signals: Sequence[Signals]) -> list[dict]:
         """Shapes that may be better once the effect is found: by `finer_steps`, one at a time."""

@@ -44,6 +44,7 @@ class Payload(Effect):
     kind: ClassVar = "payload"
     title: ClassVar = "unmodelled payload"
     signature: ClassVar = "residuals of gravity and inertia on many joints, in some runs only"
+    in_all_rows: ClassVar = True
     scope: ClassVar[Scope] = "robot"
     parameters: ClassVar = (
         Parameter("mass", "kg", 0.05, 50.0, nonnegative=True),
@@ -72,10 +73,6 @@ class Payload(Effect):
     ) -> None:
         """The body that carries it has more inertia."""
         robot.phi[self.ten(robot.robot)] += values
-
-    def rows(self, n: int) -> tuple[int, ...]:
-        """All joints."""
-        return tuple(range(n))
 
     def columns(self, signals: Signals) -> Array:
         """Ten columns of Y, (T, n, 10)."""

@@ -98,3 +98,12 @@ class Cotangents:
     load: Array | None = None
     torque: Array | None = None
     regressor: Array | None = None
+
+    def add_to(self, states: Array, torques: Array) -> None:
+        """Add those by q, v, a to `states` (3, T, n), those by load and torque to `torques`."""
+        for order, direct in enumerate((self.q, self.v, self.a)):
+            if direct is not None:
+                states[order] += direct
+        for through in (self.load, self.torque):
+            if through is not None:
+                torques += through

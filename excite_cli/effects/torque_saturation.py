@@ -15,7 +15,6 @@ from excite_cli.effects.base import (
     Parameter,
     Signals,
     Tier,
-    steps_by_ratio,
 )
 from excite_cli.effects.mechanism import real
 from excite_cli.effects.parameter import whole_share
@@ -23,7 +22,6 @@ from excite_cli.effects.simulated_robot import SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 
 _MEASURED = (0.8, 0.9, 0.95, 0.97, 0.985, 0.995)  # of a cut torque, the last ones are the level
-_FINER = (1.05, 1.02, 1.008, 1.003, 1.001)
 _QUANTILES = (0.7, 0.8, 0.9, 0.95, 0.98)
 
 
@@ -36,6 +34,7 @@ class TorqueSaturation(Effect):
     function_of: ClassVar = ("load",)
     parameters: ClassVar = (whole_share("sharpness"),)
     shapes: ClassVar = (Parameter("level", "N·m", 0.1, 1000.0),)
+    finer_ratios: ClassVar = (1.05, 1.02, 1.008, 1.003, 1.001)  # a level is seen directly
     data_defect: ClassVar = True
     tier: ClassVar = Tier.LAST
     known_by: ClassVar = "level"
@@ -73,10 +72,6 @@ class TorqueSaturation(Effect):
     def cuts_at(self) -> tuple[tuple[int, float], ...]:
         """At the level."""
         return ((self.joints[0], self.shape["level"]),)
-
-    def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
-        """Small ones: a level is seen directly."""
-        return steps_by_ratio(self.shape[name], _FINER)
 
     def build_into(
         self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]

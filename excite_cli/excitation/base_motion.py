@@ -10,10 +10,10 @@ for a falling weight λ of smoothness.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 
+from excite_cli.arrays import Mask as Mask
 from excite_cli.constraints.base import Array
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.errors import NoAdmissibleMotionError
@@ -27,8 +27,6 @@ from excite_cli.excitation.task import MotionTask
 #
 # Rows that need repair are few: the dips in time of residuals near zero. The shortest change that
 # lifts them, in the metric of the task, is a least-distance problem (Lawson and Hanson 1974).
-
-Mask = NDArray[np.bool_]
 
 _ROUNDS = 10
 # Least residual aimed at, and the residual below which a dip is repaired.

@@ -23,12 +23,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve
 
+from excite_cli.arrays import Array, Indices
 from excite_cli.excitation.objective import Objective, Spectrum, Stack
 from excite_cli.excitation.progress import Figure, ProgressMeasure
-from excite_cli.robot.model import Array
 
 # Divergence from which two effects count as told apart.
 SEPARATED = 3.0
@@ -46,7 +45,7 @@ class Direction:
 
     pair: tuple[str, str]
     truth: Array
-    free: NDArray[np.intp]
+    free: Indices
 
 
 @dataclass(frozen=True)

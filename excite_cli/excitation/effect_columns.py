@@ -119,12 +119,7 @@ class EffectColumns:
                 theirs = np.zeros((len(weights), len(effect.rows(n)), part.stop - part.start))
                 theirs[:, own] = weights[:, rows, part]
                 found = effect.pull_back(signals, theirs)
-                for order, direct in enumerate((found.q, found.v, found.a)):
-                    if direct is not None:
-                        total[order] += direct
-                for cotangent in (found.load, found.torque):
-                    if cotangent is not None:
-                        by_torque += cotangent
+                found.add_to(total, by_torque)
                 by_regressor = _sum(by_regressor, found)
         return total, by_torque, by_regressor
 
@@ -229,7 +224,7 @@ def extend(
     taken: list[Effect] = []
     left_out: list[str] = []
     scales: list[Array] = []
-    known, names, fine = drawn.inertial, list(_symbols(base)), False
+    known, names, fine = drawn.inertial, [base.names[i] for i in base.selection], False
     for effect in effects:
         reason = why_not_planned(effect, robot)
         if not reason:
@@ -308,10 +303,6 @@ def _absorbed(columns: Array, known: Array, names: list[str]) -> str:
             most = [i for i in np.argsort(-np.abs(share))[:3] if abs(share[i]) > 0.01]
             return f"collinear with {', '.join(names[i] for i in most)}"
     return ""
-
-
-def _symbols(base: BaseParameters) -> list[str]:
-    return [base.names[index] for index in base.selection]
 
 
 def in_words(effect: Effect, robot: Robot) -> str:

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Mask
 from excite_cli.config.spec import Spec
 from excite_cli.constraints.base import Array, Constraint
 from excite_cli.constraints.joint_columns import Quantity
@@ -32,8 +32,6 @@ from excite_cli.shown.answer import Shown
 # Enclosed positions say how far each joint may be from the middle of an interval. Meshes that are
 # farther apart in the middle than their links can approach each other by that stay apart
 # throughout; elsewhere the interval is cut in two.
-
-Mask = NDArray[np.bool_]
 
 _WIDTH = 0.02  # [s]
 _CUTS = 10

@@ -190,7 +190,7 @@ def kept_between_instants(
             guard + growth * lack
             for guard, growth, lack in zip(task.guards, growths, lacking, strict=True)
         ]
-        tighter = task.with_guards(guards)
+        tighter = MotionTask(task.problem, task.stack, guards)
         inside = _drawn_inside(tighter, outcome, start)
         short = Effort(
             max_iterations=max(10, effort.max_iterations // 8),

@@ -12,13 +12,11 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Mask
 from excite_cli.constraints.base import Array
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.excitation.problem import Problem
-
-Mask = NDArray[np.bool_]
 
 # Largest change of a joint between two postures that are checked [rad, m].
 _TURN, _SLIDE = 0.02, 0.005

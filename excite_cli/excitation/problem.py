@@ -220,7 +220,8 @@ def build_problem(
         What the spec asks for does not fit the robot.
     """
     robot = with_shapes(build_robot(spec.robot, relative_to), spec.constraints)
-    spec = _with_freedom(spec, robot)
+    free = with_freedom(spec.trajectory, acceleration_bounds(spec, robot))
+    spec = spec.model_copy(update={"trajectory": free})
     trajectory = build_trajectory(spec.trajectory)
     spec = with_sampling(spec, trajectory)
     cost, grid = instants(spec.sampling.cost), instants(spec.sampling.constraints)
@@ -291,11 +292,6 @@ def with_shapes(robot: Robot, spec: ConstraintsSpec) -> Robot:
         return robot
     described = without_unusable(robot.description, apart.without_shapes)
     return replace(robot, description=described, visual_shapes=apart.shapes == "visual")
-
-
-def _with_freedom(spec: Spec, robot: Robot) -> Spec:
-    trajectory = with_freedom(spec.trajectory, acceleration_bounds(spec, robot))
-    return spec.model_copy(update={"trajectory": trajectory})
 
 
 def acceleration_bounds(spec: Spec, robot: Robot) -> Array:

@@ -4,14 +4,13 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array, Indices
 from excite_cli.excitation.motion import Doubt, Motion, digest_of
 from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.random_baseline import RandomBaseline, RandomMotion
 from excite_cli.excitation.sequence import FinishedMotion
-from excite_cli.robot.model import Array
 from excite_cli.shown.answer import Shown, offered
 
 
@@ -29,7 +28,7 @@ class Result(Shown):
     fingerprint: str
     seed: int
     joint_names: tuple[str, ...]
-    base_selection: NDArray[np.intp]
+    base_selection: Indices
     base_words: tuple[str, ...]
     row_weights: Array
     column_scales: Array

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Mask
 from excite_cli.constraints.base import Array, Constraint, Indices, Parts
 from excite_cli.criteria.base import Criterion
 from excite_cli.dynamics.forward_kinematics import States
@@ -43,10 +43,6 @@ class MotionTask:
         self.n = problem.robot.n
         self.k = self.free.shape[1]
         self.evaluations = 0
-
-    def with_guards(self, guards: list[Array]) -> "MotionTask":
-        """The same task with other guards."""
-        return MotionTask(self.problem, self.stack, guards)
 
     @property
     def size(self) -> int:
@@ -163,8 +159,6 @@ def _within_ends(problem: Problem, guards: list[Array]) -> list[Array]:
 # Derivatives with respect to q at one instant reach the coefficients through the same basis row,
 # so weighted sums over thousands of rows collapse to one matrix product per pair of derivative
 # orders: Σ_t (b_t b_tᵀ) ⊗ G_t.
-
-Mask = NDArray[np.bool_]
 
 # Residuals beyond this concern no solver: they may be lower bounds instead of exact.
 REACH = 1.0

@@ -169,7 +169,9 @@ def _identified(found: Diagnosis, records: list[EffectRecord]) -> dict[str, Any]
         "effects": [_of_effect(record) for record in records],
         "held_out_run": found.held_out_run,
         "error": {
-            name: {joint: _known(x) for joint, x in getattr(found.after, name).items()}
+            name: {
+                joint: x if isfinite(x) else None for joint, x in getattr(found.after, name).items()
+            }
             for name in figures
         },
         "noise": {joint: x for joint, x in (found.noise_floor or {}).items() if isfinite(x)},
@@ -180,7 +182,3 @@ def _identified(found: Diagnosis, records: list[EffectRecord]) -> dict[str, Any]
 def _of_effect(record: EffectRecord) -> dict[str, Any]:
     told = {name: x for name, x in asdict(record).items() if x and name != "link"}
     return {name: list(x) if isinstance(x, tuple) else x for name, x in told.items()}
-
-
-def _known(x: float) -> float | None:
-    return x if isfinite(x) else None

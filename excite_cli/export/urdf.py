@@ -26,6 +26,7 @@ from excite_cli.export.exported import (
 )
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.urdf_joints import link_at
 
 _INERTIA = (
     ("ixx", 0, 0),
@@ -81,17 +82,12 @@ def updated_urdf(robot: Robot, model: IdentifiedModel) -> ModelText:
 
 def _carriers(robot: Robot, root: ElementTree.Element) -> list[str]:
     """For every body of φ the link whose frame is the body's."""
-    child = {joint.get("name", ""): _link_of(joint, "child") for joint in root.findall("joint")}
+    child = {joint.get("name", ""): link_at(joint, "child") for joint in root.findall("joint")}
     children = set(child.values())
     base = next(
         link.get("name", "") for link in root.findall("link") if link.get("name") not in children
     )
     return [child.get(str(name), base) for name in robot.model.names[1:]]
-
-
-def _link_of(joint: ElementTree.Element, end: str) -> str:
-    element = joint.find(end)
-    return "" if element is None else element.get("link", "")
 
 
 def _lumped(robot: Robot, root: ElementTree.Element, carried: str) -> list[str]:
@@ -101,8 +97,8 @@ def _lumped(robot: Robot, root: ElementTree.Element, carried: str) -> list[str]:
     while left:
         link = left.pop()
         for joint in root.findall("joint"):
-            if _link_of(joint, "parent") == link and joint.get("name") not in moving:
-                left.append(_link_of(joint, "child"))
+            if link_at(joint, "parent") == link and joint.get("name") not in moving:
+                left.append(link_at(joint, "child"))
                 found.append(left[-1])
     return found
 

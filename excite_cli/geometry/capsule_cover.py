@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 from threadpoolctl import threadpool_limits
 
+from excite_cli.arrays import Array
 from excite_cli.geometry.capsule_fit import (
     capsule_volume,
     hull_points,
@@ -21,7 +21,6 @@ from excite_cli.geometry.capsule_fit import (
 from excite_cli.geometry.link_shapes import LinkShape
 from excite_cli.robot.capsule import Capsule
 
-Array = NDArray[np.float64]
 Fit = tuple[Array, Array, float]
 
 JOIN_BELOW = 1.2  # volume of the joined capsule over the sum of the two

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial import ConvexHull, QhullError
 
-Array = NDArray[np.float64]
+from excite_cli.arrays import Array
 
 _SLACK = 1e-12  # relative to the size of the cloud
 _DIRECTIONS = 120

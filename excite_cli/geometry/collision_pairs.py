@@ -11,13 +11,13 @@ import hashlib
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
-from itertools import product
+from itertools import combinations, product
 from typing import Any
 
 import coal
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array, Indices
 from excite_cli.config.constraints_spec import SelfCollisionSpec
 from excite_cli.disk_cache import store_arrays, stored_arrays
 from excite_cli.errors import RobotError
@@ -92,8 +92,6 @@ def _reason(data: dict[str, Any] | None) -> Reason | None:
     return Reason(Why(data["why"]), None if distance is None else float(distance), apart)
 
 
-Array = NDArray[np.float64]
-
 _ALWAYS = 0.99  # share of the sample in contact
 _CONTACT_SAMPLES = 200
 _CONTACT = 0.01  # [m] a wider margin does not make a contact; it may make the problem infeasible
@@ -134,7 +132,7 @@ def choose_pairs(
     dropped: dict[tuple[int, int], Reason] = {}
     possible: list[tuple[int, int]] = []
     known = _Known(robot, spec)
-    for pair in _all_pairs(len(capsules)):
+    for pair in combinations(range(len(capsules)), 2):
         reason = known.reason(capsules[pair[0]], capsules[pair[1]])
         if reason:
             dropped[pair] = reason
@@ -157,10 +155,6 @@ def choose_pairs(
             for pair in sorted(dropped)
         ),
     )
-
-
-def _all_pairs(count: int) -> Iterator[tuple[int, int]]:
-    return ((i, j) for i in range(count) for j in range(i + 1, count))
 
 
 class _Known:
@@ -287,7 +281,7 @@ def _contacts(
 
 
 def _descend(
-    robot: Robot, measure: PairDistances, starts: Array, pairs: NDArray[np.intp], target: float
+    robot: Robot, measure: PairDistances, starts: Array, pairs: Indices, target: float
 ) -> Array:
     """Least distance (K,) [m] found for each pair on the way from its `starts` (S, K, n).
 

@@ -10,14 +10,13 @@ from itertools import product
 import coal
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from excite_cli.arrays import Array, Indices
 from excite_cli.geometry.capsule_fit import principal_axes
 from excite_cli.geometry.link_shapes import collision_model, placed_shapes
 from excite_cli.robot.model import Robot
 
-Array = NDArray[np.float64]
 Part = tuple[pin.CollisionGeometry, Array, Array]
 # A problem asks several times for those of one robot, whose collision model is shared as well.
 _latest: tuple[pin.GeometryModel, tuple["LinkMesh", ...]] | None = None
@@ -124,7 +123,7 @@ class Poses:
             rotations[t], translations[t] = turns, places
         return cls(rotations, translations)
 
-    def at(self, instants: NDArray[np.intp]) -> "Poses":
+    def at(self, instants: Indices) -> "Poses":
         """Those at some of the instants."""
         return Poses(self.rotations[instants], self.translations[instants])
 

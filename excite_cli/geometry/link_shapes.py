@@ -12,16 +12,14 @@ from itertools import product
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from excite_cli.arrays import Array, Indices, Mask
 from excite_cli.errors import RobotError
 from excite_cli.geometry.capsule_fit import sphere_points
 from excite_cli.robot.description import RobotDescription
 from excite_cli.robot.mesh_paths import Kind, check_mesh_paths, located
 from excite_cli.robot.model import Robot
-
-Array = NDArray[np.float64]
 
 _RIM = 32  # corners of a rim that stands for a circle
 _BALL = 240  # corners of a polyhedron that stands for a sphere
@@ -39,7 +37,7 @@ class LinkShape:
     links: tuple[str, ...]
     joint: int
     points: Array
-    edges: NDArray[np.intp]
+    edges: Indices
 
     def joined(self, other: "LinkShape") -> "LinkShape":
         """Both shapes as one; they must belong to the same joint."""
@@ -61,7 +59,7 @@ class LinkShape:
         lower, upper = self.points[above <= 0], self.points[above >= 0]
         return np.vstack([lower, middle]), np.vstack([upper, middle])
 
-    def _crossings(self, above: Array) -> tuple[Array, NDArray[np.bool_]]:
+    def _crossings(self, above: Array) -> tuple[Array, Mask]:
         first, second = self.edges.T
         crossing = above[first] * above[second] < 0
         first, second = first[crossing], second[crossing]
@@ -86,7 +84,7 @@ class LinkShape:
         return LinkShape(self.links, self.joint, points, edges.astype(np.intp))
 
 
-def _outline(points: Array) -> NDArray[np.intp]:
+def _outline(points: Array) -> Indices:
     """Edges of the convex outline of points (N, 3) in a plane, as pairs of indices."""
     if len(points) < 3:
         return np.zeros((0, 2), dtype=np.intp)
@@ -200,7 +198,7 @@ def _corners(item: pin.GeometryObject, robot: Robot) -> Array:
     )
 
 
-def _edges(shape: object, points: Array) -> NDArray[np.intp]:
+def _edges(shape: object, points: Array) -> Indices:
     """Edges of a mesh's triangles; of any other shape those of its convex hull."""
     if type(shape).__name__.startswith("BVHModel"):
         bvh: pin.CollisionGeometry = shape

@@ -11,8 +11,8 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array, Indices, Mask
 from excite_cli.geometry.link_meshes import LinkMesh, Poses, link_meshes
 from excite_cli.geometry.mesh_pairs import (
     MeshPair,
@@ -24,10 +24,6 @@ from excite_cli.geometry.mesh_pairs import (
 )
 from excite_cli.geometry.reasons import ContactMeaning
 from excite_cli.robot.model import Robot
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 NEAR = 0.02  # [m] pairs that stay farther apart are summarised
 _ALWAYS = 0.99  # share of random postures in contact

@@ -6,15 +6,13 @@ from itertools import product
 import coal
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array as Array
+from excite_cli.arrays import Indices
 from excite_cli.geometry.link_shapes import collision_model
 from excite_cli.geometry.obstacles import Obstacle
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 Placed = tuple[pin.CollisionGeometry, coal.Transform3s]
 

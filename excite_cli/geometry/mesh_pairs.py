@@ -8,16 +8,14 @@ from typing import Any
 
 import coal
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array, Indices, Mask
 from excite_cli.geometry.link_meshes import LinkMesh, Part, Poses
 from excite_cli.geometry.reasons import ContactMeaning
 from excite_cli.geometry.world_segments import nearest_points
 from excite_cli.kernels.compiled import KERNELS
 from excite_cli.robot.link_frame import MovedBodies
 from excite_cli.robot.model import Robot
-
-Array = NDArray[np.float64]
 
 _TOUCH = 1e-9  # [m]
 _FAR = 1e3  # [m] farther than any robot reaches
@@ -200,7 +198,7 @@ class PairTable:
         first, second, coefficients = (np.ascontiguousarray(part) for part in self._spline.tck)
         return first, second, coefficients.reshape(len(first) - 4, len(second) - 4)
 
-    def holds(self, at: Array) -> NDArray[np.bool_]:
+    def holds(self, at: Array) -> Mask:
         """Whether positions (T, 2) of the two joints are within the table (T,)."""
         low, high = (np.array([grid[end] for grid in self.grids]) for end in (0, -1))
         inside = (at >= low) & (at <= high)
@@ -240,8 +238,6 @@ class PairTable:
 # u is, and only its sharpness depends on u. Gilbert's iteration finds a good one: v is a point of
 # B − A, w the corner of B − A that is lowest along u = v/|v| (so u·w is the bound), and the next
 # v is the point of the segment from v to w that is nearest to the origin.
-
-Indices = NDArray[np.intp]
 
 _STEPS = 8
 _CROSSED = 1e-9  # [m] hulls nearer than this have no direction between them

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Indices
 from excite_cli.config.constraints_spec import SurroundingsSpec
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.errors import ConfigError, nearest
@@ -32,8 +32,6 @@ from excite_cli.robot.model import Array, Robot
 # The distance is that of the capsule's axis less its radius. With n the unit normal of the
 # obstacle and p the witness point on the axis, dd/dq_k = n·(v_k + ω_k × p) for every joint k that
 # carries the capsule, (v_k, ω_k) its twist about the world origin.
-
-Indices = NDArray[np.intp]
 
 _BLOCK = 4000
 

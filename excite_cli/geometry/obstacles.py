@@ -7,11 +7,10 @@ from typing import NamedTuple
 import coal
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array
 from excite_cli.config.constraints_spec import BoxSpec, SurroundingsSpec, WallSpec
-
-Array = NDArray[np.float64]
+from excite_cli.geometry.world_segments import dot
 
 FLOOR = "floor"
 
@@ -50,7 +49,7 @@ def segment_distances(start: Array, along: Array, half: Array) -> Array:
     shape = start.shape[1:]
     p, u = start.reshape(3, -1), along.reshape(3, -1)
     gap = _gap(p, u, half, _nearest_share(p, u, half))
-    distance = np.asarray(np.sqrt(_dot(gap, gap)))
+    distance = np.asarray(np.sqrt(dot(gap, gap)))
     inside = np.flatnonzero(distance < _CONTACT)
     if len(inside):
         distance[inside] = _way_out(p[:, inside], u[:, inside], half).distance
@@ -61,7 +60,7 @@ def segment_contacts(start: Array, along: Array, half: Array) -> BoxContact:
     """As `segment_distances`, with normals and shares; start, along: (3, K)."""
     share = _nearest_share(start, along, half)
     gap = _gap(start, along, half, share)
-    distance = np.asarray(np.sqrt(_dot(gap, gap)))
+    distance = np.asarray(np.sqrt(dot(gap, gap)))
     normal = gap / np.maximum(distance, _CONTACT)
     inside = np.flatnonzero(distance < _CONTACT)
     if len(inside):
@@ -74,7 +73,7 @@ def point_distances(points: Array, half: Array) -> Array:
     """Signed distances (...) [m] of points (3, ...) from the box."""
     beyond = np.abs(points) - half.reshape(3, *(1,) * (points.ndim - 1))
     outside = np.maximum(beyond, 0.0)
-    return np.asarray(np.sqrt(_dot(outside, outside)) + np.minimum(beyond.max(axis=0), 0.0))
+    return np.asarray(np.sqrt(dot(outside, outside)) + np.minimum(beyond.max(axis=0), 0.0))
 
 
 def _nearest_share(p: Array, u: Array, half: Array) -> Array:
@@ -134,7 +133,7 @@ def _way_out(p: Array, u: Array, half: Array) -> BoxContact:
     apart, sign = np.empty((6, count)), np.empty((6, count))
     apart[:3] = np.maximum(low, -high) - half[:, None]
     sign[:3] = np.where(low >= -high, 1.0, -1.0)
-    sine, length = np.empty((3, count)), np.sqrt(_dot(u, u))
+    sine, length = np.empty((3, count)), np.sqrt(dot(u, u))
     for k, i, j in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         sine[k] = np.hypot(u[i], u[j])
         across = u[i] * p[j] - u[j] * p[i]
@@ -161,12 +160,8 @@ def _facing(p: Array, u: Array, half: Array, axis: Array, normal: Array) -> Arra
     corner = np.sign(normal) * half[:, None]
     across = u.copy()
     across[axis, np.arange(p.shape[1])] = 0.0
-    share = _dot(corner - p, across) / np.maximum(_dot(across, across), np.finfo(float).tiny)
+    share = dot(corner - p, across) / np.maximum(dot(across, across), np.finfo(float).tiny)
     return np.clip(share, 0.0, 1.0)
-
-
-def _dot(left: Array, right: Array) -> Array:
-    return left[0] * right[0] + left[1] * right[1] + left[2] * right[2]
 
 
 class Obstacle(ABC):

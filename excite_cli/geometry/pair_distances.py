@@ -11,8 +11,8 @@ carries both bodies drops out, one that carries only the second adds n . (v + w 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array, Indices
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.geometry.world_segments import (
     CapsuleAxes,
@@ -25,9 +25,6 @@ from excite_cli.kernels.compiled import KERNELS
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.link_frame import carried_bodies
 from excite_cli.robot.model import Robot
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 _BLOCK = 8000
 

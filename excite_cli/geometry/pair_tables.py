@@ -13,8 +13,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array, Indices
 from excite_cli.disk_cache import store_arrays, stored_arrays
 from excite_cli.errors import ConfigError
 from excite_cli.geometry.capsules import geometry_key
@@ -32,9 +32,6 @@ from excite_cli.geometry.reasons import NEVER
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.link_frame import MovedBodies
 from excite_cli.robot.model import Robot
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 FAR = 0.02  # [m]
 _GRIDS = ((0.06, 49), (0.03, 97))  # [rad or m] between nodes; most nodes of one joint

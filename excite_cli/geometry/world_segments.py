@@ -5,7 +5,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.robot.capsule import Capsule
@@ -40,9 +39,9 @@ def nearest_points(
     All arguments are (3, ...): a point and the vector to the other end [m].
     """
     between = first - second
-    aa, bb = _dot(along_first, along_first), _dot(along_second, along_second)
-    ab = _dot(along_first, along_second)
-    aw, bw = _dot(along_first, between), _dot(along_second, between)
+    aa, bb = dot(along_first, along_first), dot(along_second, along_second)
+    ab = dot(along_first, along_second)
+    aw, bw = dot(along_first, between), dot(along_second, between)
     safe_aa, safe_bb = np.maximum(aa, _POINT), np.maximum(bb, _POINT)
     determinant = aa * bb - ab * ab
     skew = determinant > _PARALLEL * safe_aa * safe_bb
@@ -63,7 +62,8 @@ def _level(aa: Array, safe_aa: Array, ab: Array, aw: Array) -> Array:
     return np.where(aa > _POINT, (low + high) / 2, 0.0)
 
 
-def _dot(left: Array, right: Array) -> Array:
+def dot(left: Array, right: Array) -> Array:
+    """Scalar products (...) of vectors (3, ...)."""
     return left[0] * right[0] + left[1] * right[1] + left[2] * right[2]
 
 
@@ -74,7 +74,7 @@ def normals(nearest: NearestPoints, along_first: Array, along_second: Array) -> 
     at right angles if they are parallel): parting along it is the shortest way out.
     """
     gap = nearest.gap
-    length = np.sqrt(_dot(gap, gap))
+    length = np.sqrt(dot(gap, gap))
     crossed = length < 1e-10
     result = gap / np.where(crossed, 1.0, length)
     for k in np.flatnonzero(crossed):
@@ -92,9 +92,6 @@ def _perpendicular(first: Array, second: Array) -> Array:
         if size > 1e-6 * scale and size > 1e-18:
             return vector / size
     return np.array([0.0, 0.0, 1.0])
-
-
-Indices = NDArray[np.intp]
 
 
 class WorldSegments:

@@ -10,15 +10,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array, Mask
 from excite_cli.config.spec import Spec
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import catalogue, kind_named
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.identification.split import Split
 from excite_cli.measurement.dataset import Dataset
-from excite_cli.robot.model import Array
 
 # Samples that no fit may use, since the columns of some effect are wrong there.
 
@@ -48,14 +47,14 @@ class LeftOut:
             tuple(sorted(cut for effect in cutting for cut in effect.cuts_at())),
         )
 
-    def below_cuts(self, tau: Array) -> NDArray[np.bool_]:
+    def below_cuts(self, tau: Array) -> Mask:
         """Samples (T, n) of torques that no cut touches."""
         below = np.ones(tau.shape, dtype=bool)
         for j, level in self.cuts:
             below[:, j] &= np.abs(tau[:, j]) < _BELOW * level
         return below
 
-    def on_the_way(self, q: Array, past: Array) -> NDArray[np.bool_]:
+    def on_the_way(self, q: Array, past: Array) -> Mask:
         """Samples (T, n) of positions in which every joint has gone its way, the `past` (L, n) too.
 
         Of a run that hardly goes further, a third of its way is enough.

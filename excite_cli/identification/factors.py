@@ -10,11 +10,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Mask as Mask
 from excite_cli.robot.model import Array
 
-Mask = NDArray[np.bool_]
 # Directions weaker than this, with columns of unit norm, are not seen by the data: torque is not
 # known to a ten-millionth. With 1e-9 one sample of smoothed sign at rest held Coulomb friction and
 # offset of a joint apart, by 2e6 N·m each.

@@ -88,13 +88,7 @@ class IdentifiedModel:
                 if effect.carried or effect.data_defect != defects or not effect.active(series.run):
                     continue
                 rows = onward[:, list(effect.rows(robot.n))]
-                back = effect.pull_back(signals, rows[:, :, None] * values)
-                for order, direct in enumerate((back.q, back.v, back.a)):
-                    if direct is not None:
-                        total[order] += direct
-                for through in (back.load, back.torque):
-                    if through is not None:
-                        found += through
+                effect.pull_back(signals, rows[:, :, None] * values).add_to(total, found)
             onward = onward + found
         body = RigidBody(robot, self.phi + carried, series.q, series.v, series.a)
         total += np.array(body.pull_back(onward))

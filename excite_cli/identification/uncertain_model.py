@@ -17,15 +17,13 @@ exists. No draw is moved to the border for it.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array, Indices, Mask
 from excite_cli.dynamics.base_parameters import BaseParameters
 from excite_cli.dynamics.pseudo_inertia import InertialPrior, nearest_inertias, pseudo_inertias
 from excite_cli.errors import ConfigError
 from excite_cli.identification.consistent import without_constraints
-from excite_cli.identification.factors import Mask
 from excite_cli.identification.identified_model import IdentifiedModel
-from excite_cli.robot.model import Array
 
 _MARGIN = 1e-6  # kg per kg of the mean mass of a body: least eigenvalue of one that exists
 _BLOCK = 2  # numbers of w that move together: the more, the smaller the arcs
@@ -125,7 +123,7 @@ class _Limits:
 
 def _turned(
     w: Array,
-    block: NDArray[np.intp],
+    block: Indices,
     here: _Limits,
     signed: Array,
     bodies: Array,

@@ -10,14 +10,9 @@ import ctypes
 import importlib.util
 import os
 
-import numpy as np
-from numpy.typing import NDArray
-
+from excite_cli.arrays import Array, Indices
 from excite_cli.kernels.array_arguments import CheckedFunction
 from excite_cli.kernels.signatures import SIGNATURES
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 _ASKED = "EXCITE_KERNELS"
 _VERSION = 2  # that of the C files; raise both when a function takes other arguments

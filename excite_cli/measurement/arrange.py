@@ -71,7 +71,7 @@ def arrange(
         own = {**names, **torque_names} if channel == "tau" else names
         by_joint = {own.get(column, column): values for column, values in columns.items()}
         if channel in ("tau", *beside):
-            by_joint.update(_none(without_torque, raw))
+            by_joint |= {joint: np.zeros(len(raw.t)) for joint in without_torque}
         missing = [joint for joint in joints if joint not in by_joint]
         if not missing:
             matrices[channel] = np.column_stack([by_joint[joint] for joint in joints])
@@ -108,10 +108,6 @@ def arrange(
         extra={**kept, **extra},
     )
     return run, findings
-
-
-def _none(joints: Sequence[str], raw: RawRun) -> dict[str, Array]:
-    return {joint: np.zeros(len(raw.t)) for joint in joints}
 
 
 def _numbered(columns: list[str], joints: tuple[str, ...], source: str) -> dict[str, str]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from excite_cli.config.plain_yaml import parse_plain
-from excite_cli.errors import ExciteError, FileError, MissingExtraError, nearest
+from excite_cli.errors import ExciteError, FileError, nearest, optional_module
 from excite_cli.measurement.bag_sensors import SensorMessages, types_of, with_sensors
 from excite_cli.measurement.base_channel import BaseChannel
 from excite_cli.measurement.dataset import Finding
@@ -39,7 +39,10 @@ class BagReader(Reader):
 
     def read(self, path: Path, wanted: ReadOptions) -> list[RawRun]:
         """The bag's only run: one topic of JointState, in the order of its stamps."""
-        _require_rosbags()
+        optional_module(
+            "rosbags.rosbag2",
+            "Reading ROS bags needs the library rosbags: pip install 'excite-cli[bags]'",
+        )
         check_bag(path)
         try:
             with ExitStack() as stack:
@@ -84,15 +87,6 @@ def check_bag(path: Path) -> None:
         parse_plain(metadata.read_text(encoding="utf-8"), str(metadata))
     except (OSError, UnicodeDecodeError) as error:
         raise FileError(f"{metadata} cannot be read as text: {error}.") from error
-
-
-def _require_rosbags() -> None:
-    try:
-        import rosbags.rosbag2  # noqa: F401
-    except ImportError as error:
-        raise MissingExtraError(
-            "Reading ROS bags needs the library rosbags: pip install 'excite-cli[bags]'"
-        ) from error
 
 
 def _stored(folder: Path) -> list[Path]:

@@ -142,7 +142,12 @@ def run_of_table(path: Path, table: NamedColumns, wanted: ReadOptions) -> RawRun
     wanted = _by_fields(columns, wanted)
     of_joints = any((w := wanted.called(c)) and _joints(columns, w) for c in (*CHANNELS, *SENT))
     if not of_joints and not apart:
-        raise FileError(_no_columns(path, "q", wanted, words))
+        raise FileError(
+            f"{path} has no columns '{wanted.called('q') or 'q'}_<joint>'; its columns: {words}. A "
+            "file holds one run: t, q_<joint>, …, tau_<joint>, … (and dq_<joint>), or some of "
+            "these channels, which are joined with those of the other files. A channel of another "
+            "name: measurement.channels: {q: …}."
+        )
     time = wanted.called("t")
     stamped = time is not None and time in columns
     if stamped:
@@ -173,16 +178,6 @@ def _by_fields(columns: Mapping[str, Array], wanted: ReadOptions) -> ReadOptions
         if not (channel in wanted.channels or is_there(channel)) and is_there(field):
             found[channel] = field
     return replace(wanted, channels={**found, **wanted.channels}) if found else wanted
-
-
-def _no_columns(path: Path, channel: str, wanted: ReadOptions, words: str) -> str:
-    called = wanted.called(channel) or channel
-    return (
-        f"{path} has no columns '{called}_<joint>'; its columns: {words}. A file holds one run: "
-        "t, q_<joint>, …, tau_<joint>, … (and dq_<joint>), or some of these channels, which are "
-        "joined with those of the other files. A channel of another name: measurement.channels: "
-        f"{{{channel}: …}}."
-    )
 
 
 def _joint_of(column: str, channel: str) -> str:

@@ -245,7 +245,7 @@ def _careful(path: Path, layout: _Layout) -> tuple[dict[str, Array], dict[str, s
         if isinstance(values, int):
             values = _dates(texts, values)
         if isinstance(values, int):
-            if _any_number(texts):
+            if any(text and _is_numeric(text) for text in texts[:1000]):
                 raise FileError(
                     f"{path}, line {numbers[values]}: '{texts[values][:40]}' in column '{name}' "
                     "is not a number. Leave the field empty where a value is missing."
@@ -282,7 +282,3 @@ def _dates(texts: tuple[str, ...], index: int) -> Array | int:
         return index
     zoned = (each if each.tzinfo else each.replace(tzinfo=UTC) for each in found)
     return np.array([each.timestamp() for each in zoned])
-
-
-def _any_number(texts: tuple[str, ...]) -> bool:
-    return any(text and _is_numeric(text) for text in texts[:1000])

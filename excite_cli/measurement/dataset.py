@@ -11,14 +11,14 @@ from typing import Any, Literal, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from excite_cli.arrays import Array as Array
+from excite_cli.arrays import Mask as Mask
 from excite_cli.measurement.at_hand import columns_in, names_of, tables_of
 from excite_cli.measurement.run_identity import Origin, Part, RunId
 from excite_cli.out_of_core import Spool
 from excite_cli.shown.answer import Shown
 
 _BEFORE = 20.0  # s: longer ago is forgotten
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Severity = Literal["note", "warning", "error"]
 Given = Array | Sequence[Array]  # of one recording, or of each of several
 

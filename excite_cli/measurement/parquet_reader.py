@@ -255,7 +255,12 @@ def _runs(path: Path, table: ParquetTable, wanted: ReadOptions) -> Iterator[RawR
         own = {name: values[rows] for name, values in columns.items()}
         run = run_of_table(path, NamedColumns(own, findings), wanted)
         if any(not run.columns.get(channel) for channel in wanted.needed):
-            raise FileError(_no_torques(path, columns))
+            raise FileError(
+                f"{path} is of LeRobot and has no torques; it has: {listed([*columns])}. Torques "
+                "are entries <joint>.torque or <joint>.effort of observation.state, or all of "
+                "observation.effort or observation.torque; currents: measurement.channels: "
+                "{tau: current}. Record them with the positions."
+            )
         name = f"episode_{int(number):06d}"
         yield replace(run, name=name, place=f"{EPISODE} {number:.0f}", seconds=True)
 
@@ -267,12 +272,3 @@ def _flat(columns: dict[str, Array]) -> Iterator[tuple[str, Array]]:
             yield name, values
         else:
             yield from ((f"{name}_{k + 1}", column) for k, column in enumerate(values.T))
-
-
-def _no_torques(path: Path, columns: dict[str, Array]) -> str:
-    return (
-        f"{path} is of LeRobot and has no torques; it has: {listed([*columns])}. Torques are "
-        "entries <joint>.torque or <joint>.effort of observation.state, or all of "
-        "observation.effort or observation.torque; currents: measurement.channels: {tau: current}. "
-        "Record them with the positions."
-    )

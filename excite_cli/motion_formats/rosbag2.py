@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from excite_cli.atomic import write_folder_atomically
-from excite_cli.errors import ExciteError, FileError, MissingExtraError
+from excite_cli.errors import ExciteError, FileError, MissingExtraError, optional_module
 from excite_cli.measurement.bag_reader import check_bag
 from excite_cli.motion_formats.base import MotionFormat
 from excite_cli.motion_formats.joint_trajectory import joint_trajectory, motion_of
@@ -124,13 +124,9 @@ def message_of(store: Any, tree: dict[str, Any]) -> Any:
 
 
 def _library() -> Any:
-    try:
-        import rosbags.rosbag2
-    except ImportError as error:
-        raise MissingExtraError(
-            "ROS bags need the library rosbags: pip install 'excite-cli[bags]'"
-        ) from error
-    return rosbags.rosbag2
+    return optional_module(
+        "rosbags.rosbag2", "ROS bags need the library rosbags: pip install 'excite-cli[bags]'"
+    )
 
 
 def _only_message(path: Path, reader: Any) -> dict[str, Any]:

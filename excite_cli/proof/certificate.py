@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array, Mask
 from excite_cli.dynamics.forward_kinematics import States
 from excite_cli.proof.enclosed_motion import (
     EnclosedMotion,
@@ -58,7 +58,6 @@ class Worst:
         return replace(worse, violations=self.violations + later.violations)
 
 
-Array = NDArray[np.float64]
 State = Literal["proved", "sampled", "broken"]
 
 _WIDTH = 0.04  # [s] of the first intervals
@@ -157,7 +156,7 @@ def certify(path: Path, constraints: Sequence[Provable]) -> tuple[ProofVerdict, 
     )
 
 
-def _doubtful(least: Array, constraint: Provable) -> NDArray[np.bool_]:
+def _doubtful(least: Array, constraint: Provable) -> Mask:
     """Which intervals are not proved; what is not a number proves nothing."""
     return np.asarray(~(least >= -constraint.rounding).all(axis=1))
 
@@ -195,9 +194,7 @@ def _settled(path: Path, constraint: Provable, open_: list[Intervals]) -> ProofV
     return ProofVerdict(constraint.name, "proved", lacking)
 
 
-def _still_open(
-    path: Path, constraint: Provable, intervals: Intervals
-) -> tuple[Intervals, NDArray[np.bool_]]:
+def _still_open(path: Path, constraint: Provable, intervals: Intervals) -> tuple[Intervals, Mask]:
     """Those of the intervals that are not proved, and in which columns (m,) any is not."""
     keep: list[Intervals] = []
     columns = np.zeros(len(constraint.labels), dtype=bool)

@@ -13,15 +13,13 @@ if both shapes moved towards each other as far as they can are not looked at tha
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Indices
 from excite_cli.geometry.obstacles import Box, Obstacle, Plane
 from excite_cli.geometry.world_segments import nearest_points, normals
 from excite_cli.proof.enclosed_motion import EnclosedMotion
 from excite_cli.proof.taylor import Array, Taylor, dot
 from excite_cli.robot.capsule import Capsule
-
-Indices = NDArray[np.intp]
 
 BESIDE = 0.7  # where in the interval the normals are compared
 

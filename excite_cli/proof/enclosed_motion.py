@@ -171,7 +171,7 @@ class EnclosedMotion:
         for joint in self._joints:
             turn, origin = found[joint.parent]
             origin = origin + _moved(turn, joint.shift)
-            placed = _times_fixed(turn, joint.turn)
+            placed = _moved(turn, joint.turn)
             if joint.variable < 0:
                 found.append((placed, origin))
                 continue
@@ -282,12 +282,8 @@ def _rotation(axis: Array, sine: Taylor, cosine: Taylor) -> Taylor:
     return one + (np.eye(3) + square)
 
 
-def _times_fixed(turn: Taylor, fixed: Array) -> Taylor:
-    return Taylor(turn.terms @ fixed, turn.radius @ np.abs(fixed))
-
-
 def _moved(turn: Taylor, local: Array) -> Taylor:
-    """A vector fixed in a body, in world axes (T, 3)."""
+    """A vector (3,) or axes (3, 3) fixed in a body, in world axes (T, 3) or (T, 3, 3)."""
     return Taylor(turn.terms @ local, turn.radius @ np.abs(local))
 
 

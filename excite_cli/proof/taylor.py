@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from typing import Union
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from excite_cli.arrays import Array as Array
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array
 from excite_cli.config.load_spec import parsed_spec
 from excite_cli.constraints.base import Constraint
 from excite_cli.constraints.joint_columns import Quantity
@@ -75,7 +75,6 @@ def first_posture(
     return FirstPosture(moved, others, f"{words}, at least a tenth of the range from the limits")
 
 
-Array = NDArray[np.float64]
 Tree = dict[str, Any]
 Comments = dict[tuple[str, ...], str]
 
@@ -128,7 +127,8 @@ def settle(tree: Tree, comments: Comments, folder: Path) -> FeasibleProblem:
             continue
         moved = moved or not start.as_configured
         posture = np.round(start.posture, digits)
-        _write(tree, problem, posture)
+        written = tree["robot"].setdefault("posture", {})
+        written.update(zip(problem.robot.joint_names, posture.tolist(), strict=True))
         if _without_lasting_contacts(tree, comments, problem, posture):
             continue  # other links have capsules of their own then, so what is written is tried
         if unclear(task, posture):
@@ -169,11 +169,6 @@ def _crowded(around: list[tuple[str, str]], tries: int) -> NoAdmissibleMotionErr
         f"No posture of the robot is clear of what stands around it: too near in the best of "
         f"{tries} are {pairs}{more}. Give {', or '.join(advice)}."
     )
-
-
-def _write(tree: Tree, problem: Problem, posture: Array) -> None:
-    into = tree["robot"].setdefault("posture", {})
-    into.update(zip(problem.robot.joint_names, posture.tolist(), strict=True))
 
 
 def _yielded(tree: Tree, comments: Comments, task: MotionTask, posture: Array) -> bool:

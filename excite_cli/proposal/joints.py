@@ -182,7 +182,7 @@ def _reason(joint: UrdfJoint, joints: tuple[UrdfJoint, ...]) -> str:
         return "faces"
     if words & _SOFT:
         return "springs, bellows and hoses"
-    alike = _everywhere(joints)
+    alike = set.intersection(*(_words(joint.name) for joint in joints))
     words -= alike
     wrist = bool(words & _WRISTS)
     fingers = _FINGERS - alike
@@ -207,11 +207,6 @@ def _words(name: str) -> set[str]:
     apart = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name)
     words = re.split(r"[^a-z0-9]+", apart.lower())
     return {re.sub(r"(?<=[a-z]{2})\d+$", "", word) for word in words}
-
-
-def _everywhere(joints: tuple[UrdfJoint, ...]) -> set[str]:
-    """Words that stand in the name of every joint that moves on its own."""
-    return set.intersection(*(_words(joint.name) for joint in joints))
 
 
 def _as_asked(joints: tuple[UrdfJoint, ...], asked: tuple[str, ...]) -> JointChoice:

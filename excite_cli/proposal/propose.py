@@ -51,6 +51,7 @@ _MARGIN = 0.01
 _SECONDS = 60.0
 # A diagnosis holds the last one out, and what tells runs apart needs two beside it.
 _MOTIONS = 3
+_FARTHEST = 3  # folders upwards, for which a path is still told as a relative one
 _DENSITY = 1000.0
 _ASSUMED = (
     "[kg/m³] the URDF has no masses: its shapes' hulls are taken at this density. Motions excite "
@@ -121,7 +122,7 @@ def propose(request: Request) -> Proposal:
     description, allowed = load_with_folders(
         request.urdf, dirs, request.folder, arguments, request.allow
     )
-    more = (_written(each.folder, request.folder) for each in allowed)
+    more = (path_from(request.folder, each.folder) for each in allowed)
     dirs = tuple(dict.fromkeys((*dirs, *more)))
     source = description.path.name
     shapes = choose_shapes(description)
@@ -363,10 +364,10 @@ def _require_inertias(facts: UrdfSurvey, source: str) -> None:
     )
 
 
-def _written(folder: Path, start: Path) -> str:
-    """A path as the config says it: relative where it is near."""
-    relative = os.path.relpath(folder, start)
-    return str(folder) if relative.count("..") > 3 else relative
+def path_from(start: Path, path: Path) -> str:
+    """A path as the config in the folder `start` says it: relative where it is near."""
+    relative = os.path.relpath(path, start)
+    return str(path) if relative.count("..") > _FARTHEST else relative
 
 
 def _header(request: Request, description: RobotDescription) -> str:

@@ -10,7 +10,7 @@ from excite_cli.errors import RobotError
 from excite_cli.robot.allowed_files import allowed_files
 from excite_cli.robot.description import MAX_URDF_BYTES, RobotDescription
 from excite_cli.robot.mesh_paths import Unusable, unusable, without_unusable
-from excite_cli.robot.urdf_joints import UrdfSurvey, survey
+from excite_cli.robot.urdf_joints import UrdfSurvey, link_at, survey
 
 # SRDF, what MoveIt and others write beside a URDF: postures, and pairs not to check.
 #
@@ -254,7 +254,7 @@ class _Bodies:
             if any(link.find(f"{kind}/geometry") is not None for kind in kinds)
         }
         joints = [
-            (_link(joint, "parent"), _link(joint, "child"), joint.get("name") in moved)
+            (link_at(joint, "parent"), link_at(joint, "child"), joint.get("name") in moved)
             for joint in root.findall("joint")
         ]
         children: dict[str, list[tuple[str, bool]]] = {}
@@ -276,8 +276,3 @@ class _Bodies:
         """Whether two links have shapes, move against each other, and no joint joins them."""
         apart = self.of[one] != self.of[other] and frozenset((one, other)) not in self._joined
         return apart and {one, other} <= self._solid
-
-
-def _link(joint: ElementTree.Element, end: str) -> str:
-    found = joint.find(end)
-    return "" if found is None else found.get("link", "")

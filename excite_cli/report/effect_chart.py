@@ -4,13 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array, Indices
 from excite_cli.diagnosis.traces import EffectTrace
 from excite_cli.report.chart import limits_about
 from excite_cli.report.plot import Curve, Panel, Plot, merged
 from excite_cli.report.residual_chart import readable_unit, torque_or_force
-from excite_cli.robot.model import Array
 
 PREDICTED = "torque that the effect predicts"
 _MOST_DOTS = 260
@@ -123,7 +122,7 @@ def binned(cloud: Cloud) -> tuple[Array, Array, Array, Array]:
     return center, middle, low, high
 
 
-def _bins(cloud: Cloud, each: int, most: int) -> list[NDArray[np.intp]]:
+def _bins(cloud: Cloud, each: int, most: int) -> list[Indices]:
     """Samples in the order of x, in bins of `each` or more, at most so many to a side of zero."""
     if cloud.period is not None:
         sides = [np.arange(len(cloud.x))]

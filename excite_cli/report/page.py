@@ -7,11 +7,10 @@ Every text is escaped by the template engine: names come from unchecked files.
 
 import functools
 import hashlib
-import importlib
-from importlib import resources
+from importlib import import_module, resources
 from typing import Any
 
-from excite_cli.errors import MissingExtraError
+from excite_cli.errors import optional_module
 from excite_cli.report.chart import Chart
 from excite_cli.report.plot import Plot
 from excite_cli.shown.answer import Charts, Choice, Command, Fold, Page, Table, Text
@@ -39,12 +38,9 @@ def render(page: Page) -> str:
 
 
 def _environment() -> Any:
-    try:
-        jinja2 = importlib.import_module("jinja2")
-    except ImportError as error:
-        raise MissingExtraError(
-            "Reports need jinja2, which is not installed. Run: pip install 'excite-cli[plot]'"
-        ) from error
+    jinja2 = optional_module(
+        "jinja2", "Reports need jinja2, which is not installed. Run: pip install 'excite-cli[plot]'"
+    )
     environment = jinja2.Environment(
         loader=jinja2.FunctionLoader(_asset),
         autoescape=True,
@@ -52,7 +48,7 @@ def _environment() -> Any:
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    safe = importlib.import_module("markupsafe").Markup
+    safe = import_module("markupsafe").Markup
     environment.globals["policy"] = _policy()
     environment.globals["asset"] = lambda name: safe(_asset(name))
     environment.filters["drawing"] = lambda chart: safe(chart.svg)
@@ -80,7 +76,7 @@ def _asset(name: str) -> str:
 
 def _sentence(text: str) -> Any:
     """Escaped text in which `commands` between backticks are set as code."""
-    markup = importlib.import_module("markupsafe")
+    markup = import_module("markupsafe")
     parts = [markup.escape(part) for part in text.split("`")]
     if len(parts) % 2 == 0:  # a lone backtick is no quotation
         return markup.escape(text)
@@ -92,7 +88,7 @@ def _sentence(text: str) -> Any:
 
 def _lines(text: str) -> Any:
     """Escaped text with its ends of lines."""
-    markup = importlib.import_module("markupsafe")
+    markup = import_module("markupsafe")
     return markup.Markup("<br>").join(text.split("\n"))
 
 

@@ -1,7 +1,6 @@
 """The charts of a page as still pictures: what its script draws on a screen, for paper."""
 
 import functools
-import importlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from textwrap import wrap
@@ -9,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from excite_cli.errors import MissingExtraError
+from excite_cli.errors import optional_module
 from excite_cli.report.chart import Colour
 from excite_cli.report.plot import Curve, Look, Panel, Plot
 from excite_cli.report.rows_chart import Form, Mark, RowsChart
@@ -71,12 +70,10 @@ def matplotlib_part(name: str) -> Any:
     MissingExtraError
         matplotlib is not installed.
     """
-    try:
-        return importlib.import_module(f"matplotlib.{name}" if name else "matplotlib")
-    except ImportError as error:
-        raise MissingExtraError(
-            "Figures need matplotlib, which is not installed. Run: pip install 'excite-cli[plot]'"
-        ) from error
+    return optional_module(
+        f"matplotlib.{name}" if name else "matplotlib",
+        "Figures need matplotlib, which is not installed. Run: pip install 'excite-cli[plot]'",
+    )
 
 
 def styled(draw: Callable[P, T]) -> Callable[P, T]:

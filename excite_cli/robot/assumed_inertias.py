@@ -14,15 +14,14 @@ from pathlib import Path
 
 import coal
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from excite_cli.arrays import Array
 from excite_cli.disk_cache import store_arrays, stored_arrays
 from excite_cli.robot.description import RobotDescription
 from excite_cli.robot.formats.base import origin_of
 from excite_cli.robot.mesh_paths import Kind, MeshFiles, unusable
 
-Array = NDArray[np.float64]
 Element = ElementTree.Element
 
 _RIM = 32  # corners of a rim that stands for a circle

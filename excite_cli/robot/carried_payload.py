@@ -4,13 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array
 from excite_cli.config.robot_spec import PayloadSpec
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.robot.capsule import Capsule
-
-Array = NDArray[np.float64]
 
 PAYLOAD = "payload"
 _ROUNDING = 1e-9

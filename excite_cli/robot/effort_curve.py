@@ -11,9 +11,8 @@ braking has all the torque of standing still.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from excite_cli.arrays import Array, Indices
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +42,7 @@ class EffortCurve:
         """Slope (P,) of the line before each point: 0 before the first, where it brakes."""
         return np.concatenate([[0.0], np.diff(self.efforts) / np.diff(self.speeds)])
 
-    def line(self, speed: Array) -> NDArray[np.intp]:
+    def line(self, speed: Array) -> Indices:
         """Which line each of `speed` is on: that which ends at this point, the last one beyond."""
         at = np.searchsorted(self.speeds, speed, side="left")
         return np.minimum(at, len(self.speeds) - 1)

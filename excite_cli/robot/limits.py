@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array
 from excite_cli.config.robot_spec import LIMIT_PRESETS, JointLimits, RobotSpec
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.robot.effort_curve import EffortCurve
@@ -58,8 +58,6 @@ def ordered_limits(path: Path, root: ElementTree.Element) -> dict[str, str]:
             )
     return said
 
-
-Array = NDArray[np.float64]
 
 # Where a robot has no bound of its own, samples are drawn from these.
 _TURN = np.pi

@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from excite_cli.arrays import Array as Array
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.measurement.motors import Motors, motors_of
@@ -32,8 +33,6 @@ from excite_cli.robot.limits import (
 from excite_cli.robot.loops import Mimic
 from excite_cli.robot.parsed_model import parsed_model, reduced_model
 from excite_cli.robot.posture import Coupling, posture_of, require_known
-
-Array = NDArray[np.float64]
 
 _FASTEST = 10.0  # where a robot has no bound of its own, samples are drawn below this
 

@@ -2,13 +2,11 @@
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import RobotError
 from excite_cli.robot.description import RobotDescription, require_limits
-
-Array = NDArray[np.float64]
 
 _LINK = " (link)"
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array, Indices
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.robot.limits import JointRange, Limits
@@ -105,8 +105,6 @@ def require_known(joint: str, names: list[str], where: str) -> None:
 # everything that is known of all joints (regressor, gradients, enclosures over intervals) is
 # known exactly of those that move on their own.
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class Coupling:
@@ -118,7 +116,7 @@ class Coupling:
     """
 
     joint_names: tuple[str, ...]
-    driver: NDArray[np.intp]
+    driver: Indices
     multiplier: Array
     offset: Array
     limits: Limits

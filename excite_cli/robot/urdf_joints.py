@@ -81,8 +81,8 @@ class _Tree:
         self._children: dict[str, list[ElementTree.Element]] = {}
         self._parent_joint: dict[str, ElementTree.Element] = {}
         for element in self.joints:
-            self._children.setdefault(_link(element, "parent"), []).append(element)
-            self._parent_joint[_link(element, "child")] = element
+            self._children.setdefault(link_at(element, "parent"), []).append(element)
+            self._parent_joint[link_at(element, "child")] = element
 
     def below(self, link: str) -> tuple[float, list[str]]:
         """The mass of `link` and all that it carries, and movable joints between these."""
@@ -94,7 +94,7 @@ class _Tree:
             seen.add(at)
             mass += self.masses.get(at, 0.0)
             for element in self._children.get(at, []):
-                todo.append(_link(element, "child"))
+                todo.append(link_at(element, "child"))
                 if element.get("type") != "fixed":
                     names.append(element.get("name", ""))
         return mass, names
@@ -111,7 +111,7 @@ class _Tree:
         )
         found = []
         for element in self.joints:
-            body = self._body(_link(element, "child"))
+            body = self._body(link_at(element, "child"))
             mass = sum(self.masses.get(link, 0.0) for link in body)
             if element.get("type") != "fixed" and mass > 0 and not body & solid and body & shown:
                 found.append(element.get("name", ""))
@@ -125,19 +125,19 @@ class _Tree:
             if at not in body:
                 body.add(at)
                 fixed = (e for e in self._children.get(at, []) if e.get("type") == "fixed")
-                todo += [_link(element, "child") for element in fixed]
+                todo += [link_at(element, "child") for element in fixed]
         return body
 
     def above(self, element: ElementTree.Element) -> list[str]:
         """Movable joints between the root and a joint."""
         names: list[str] = []
-        link, seen = _link(element, "parent"), set()
+        link, seen = link_at(element, "parent"), set()
         while link in self._parent_joint and link not in seen:
             seen.add(link)
             upper = self._parent_joint[link]
             if upper.get("type") != "fixed":
                 names.append(upper.get("name", ""))
-            link = _link(upper, "parent")
+            link = link_at(upper, "parent")
         return names[::-1]
 
 
@@ -151,14 +151,14 @@ def survey(description: RobotDescription) -> UrdfSurvey:
     for element in tree.joints:
         if element.get("type") == "fixed":
             continue
-        child = _link(element, "child")
+        child = link_at(element, "child")
         mass, beyond = tree.below(child)
         lower, upper = _limit(element, "lower", 0.0), _limit(element, "upper", 0.0)
         joints.append(
             UrdfJoint(
                 name=element.get("name", ""),
                 kind=element.get("type", ""),
-                parent=_link(element, "parent"),
+                parent=link_at(element, "parent"),
                 child=child,
                 lower=lower if lower > -UNBOUNDED else -math.inf,
                 upper=upper if upper < UNBOUNDED else math.inf,
@@ -204,7 +204,8 @@ def _narrow(joints: list[UrdfJoint]) -> None:
         )
 
 
-def _link(element: ElementTree.Element, end: str) -> str:
+def link_at(element: ElementTree.Element, end: str) -> str:
+    """The link at the `parent` or `child` end of a <joint>; empty where it names none."""
     found = element.find(end)
     return "" if found is None else found.get("link", "")
 

@@ -9,11 +9,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from html import escape
-from importlib import import_module
 from types import MappingProxyType
 from typing import Any, Self, TypeVar
 
-from excite_cli.errors import ConfigError, MissingExtraError, nearest
+from excite_cli.errors import ConfigError, nearest, optional_module
 
 
 class Detail(IntEnum):
@@ -286,12 +285,10 @@ class Shown:
             kind, own = type(self).__name__, ", ".join(tables) or "none"
             close = nearest(str(name), tables)
             raise ConfigError(f"{kind} has no table '{name}'. Tables: {own}.{close}")
-        try:
-            pandas = import_module("pandas")
-        except ImportError as error:
-            raise MissingExtraError(
-                "Tables need pandas, which is not installed. Run: pip install 'excite-cli[tables]'"
-            ) from error
+        pandas = optional_module(
+            "pandas",
+            "Tables need pandas, which is not installed. Run: pip install 'excite-cli[tables]'",
+        )
         rows = tables[name](self)
         return pandas.DataFrame(rows, columns=None if rows else _OF_EFFECTS)
 

@@ -75,7 +75,7 @@ def _parsed(text: str) -> CovariateSeries:
     if rest.lower().endswith((".csv", ".csv.gz")):
         return _of_table(name, Path(rest), where)
     first, *more = rest.split(",")
-    start = _number(first, where)
+    start = finite_number(first, where)
     given = {"end": start, "time_constant": _TIME_CONSTANT, "noise": 0.0}
     for part in more:
         key, colon, number = (word.strip() for word in part.partition(":"))
@@ -84,7 +84,7 @@ def _parsed(text: str) -> CovariateSeries:
                 f"{where}: '{part}' is not one of {', '.join(f'{each}:value' for each in given)}."
                 f"{nearest(key, given)}"
             )
-        given[key] = _number(number, where)
+        given[key] = finite_number(number, where)
     if given["time_constant"] <= 0.0 or given["noise"] < 0.0:
         raise ConfigError(f"{where}: time_constant must be positive, noise not negative.")
     return CovariateSeries.warming(name, start, **given)
@@ -106,7 +106,8 @@ def _of_table(name: str, path: Path, where: str) -> CovariateSeries:
     return CovariateSeries(name, tuple(t.tolist()), tuple(values.tolist()))
 
 
-def _number(text: str, where: str) -> float:
+def finite_number(text: str, where: str) -> float:
+    """The number of a text; ConfigError where it has none, or one that is not finite."""
     try:
         value = float(text)
     except ValueError:

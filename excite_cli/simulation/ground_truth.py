@@ -20,7 +20,7 @@ from excite_cli.effects.catalogue import kind_named, require_covariate
 from excite_cli.effects.placing import places_named
 from excite_cli.errors import ConfigError, nearest
 from excite_cli.robot.model import Array, Robot
-from excite_cli.simulation.covariate_series import CovariateSeries
+from excite_cli.simulation.covariate_series import CovariateSeries, finite_number
 
 FORM = "kind@joint[,joint…]=value[,name:value…][;runs:name|name][;covariate:column]"
 
@@ -124,7 +124,7 @@ def parse_planted(
 
 def _numbers(text: str, kind: type[Effect], where: str) -> tuple[float, dict[str, float]]:
     first, *rest = text.split(",")
-    value = _number(first, where)
+    value = finite_number(first, where)
     others: dict[str, float] = {}
     allowed = allowed_names(kind)
     for part in rest:
@@ -136,7 +136,7 @@ def _numbers(text: str, kind: type[Effect], where: str) -> tuple[float, dict[str
                 f"{where}: {kind.kind} has no parameter '{name}'.{nearest(name, allowed)} "
                 f"Allowed after the first value: {', '.join(allowed) or 'none'}."
             )
-        others[name] = _number(number, where)
+        others[name] = finite_number(number, where)
     return value, others
 
 
@@ -152,16 +152,6 @@ def _understood(kind: type[Effect], value: float, name: str) -> bool:
     """Whether `kind` takes `name` when planted: some say their parameters in other words too."""
     first, second = (kind.planted(value, {name: probe}) for probe in (0.37, 0.73))
     return first[0] != second[0] or not np.array_equal(first[1], second[1])
-
-
-def _number(text: str, where: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
-        raise ConfigError(f"{where}: '{text.strip()}' is not a finite number.")
-    return value
 
 
 def _clauses(

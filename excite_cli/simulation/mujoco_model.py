@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY
-from excite_cli.errors import MissingExtraError
+from excite_cli.errors import optional_module
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.tree import Tree, TreeJoint, tree_of
 
@@ -30,14 +30,11 @@ def load_mujoco() -> Any:
     MissingExtraError
         It is not installed.
     """
-    try:
-        import mujoco
-    except ImportError as error:
-        raise MissingExtraError(
-            "Simulating needs MuJoCo, which is not installed. "
-            "Install it with: pip install 'excite-cli[sim]'"
-        ) from error
-    return mujoco
+    return optional_module(
+        "mujoco",
+        "Simulating needs MuJoCo, which is not installed. "
+        "Install it with: pip install 'excite-cli[sim]'",
+    )
 
 
 @contextmanager

@@ -18,9 +18,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from excite_cli.robot.model import Array
+from excite_cli.arrays import Array, Indices
 from excite_cli.simulation.mujoco_model import load_mujoco, silent_engine
 
 HORIZONS = (0.1, 1.0, 10.0)  # s
@@ -53,7 +52,7 @@ class SetPointErrors:
     """
 
     after: Array
-    starts: NDArray[np.intp]
+    starts: Indices
     whole: Array
     lost: bool
 
@@ -89,7 +88,7 @@ def set_point_errors(
 
 def _starts(
     runs: Sequence[SetPointInput], run: SetPointInput, horizon: float, count: int
-) -> NDArray[np.intp]:
+) -> Indices:
     """Samples of `run` to begin at: its share of the starts of all runs."""
     room = len(run.t) - 1 - count
     if room < 0 or count < 1:
@@ -135,7 +134,7 @@ class _Player:
         deviation = np.concatenate(found) - run.q[first + 1 : first + 1 + count]
         return np.clip(np.nan_to_num(deviation, nan=_LOST), -_LOST, _LOST)
 
-    def _newest(self, times: Array) -> NDArray[np.intp]:
+    def _newest(self, times: Array) -> Indices:
         """The set point that acts at each of `times` (K,)."""
         sent = np.searchsorted(self.run.sent, times - self.delay + _ROUNDING, side="right") - 1
         return np.maximum(sent, 0)

@@ -9,7 +9,7 @@ import numpy as np
 from excite_cli.config.load_spec import load_spec, parse_spec
 from excite_cli.config.spec import IdentifiedSpec, Spec
 from excite_cli.diagnosis.candidates import effect_of
-from excite_cli.diagnosis.records import Diagnosis, EffectRecord
+from excite_cli.diagnosis.records import Diagnosis, EffectRecord, by_joint
 from excite_cli.diagnosis.reduced_model import reduced_model
 from excite_cli.dynamics.regressor import standard_parameter_names
 from excite_cli.effects.base import Effect
@@ -191,20 +191,16 @@ def _robot(path: Path, config: str, folder: str, fingerprint: str) -> tuple[Spec
     spec = parse_spec(config, f"the config stored in {path}")
     robot = build_measured_robot(spec.robot, Path(folder))
     if robot.fingerprint() != fingerprint:
-        raise _other_robot(path, spec)
+        raise FileError(
+            f"{path} was made with another robot than the URDF gives now ({spec.robot.urdf}). "
+            "Identify again."
+        )
     return spec, Path(folder), robot
 
 
 def _other_bodies(path: Path) -> FileError:
     return FileError(
         f"{path} holds parameters of other joints or bodies than its config. Identify again."
-    )
-
-
-def _other_robot(path: Path, spec: Spec) -> FileError:
-    return FileError(
-        f"{path} was made with another robot than the URDF gives now ({spec.robot.urdf}). Identify "
-        "again."
     )
 
 
@@ -226,4 +222,4 @@ def _model(phi: Any, records: list[EffectRecord], robot: Robot, path: Path) -> I
 def _by_joint(values: Any, robot: Robot) -> dict[str, float] | None:
     if not isinstance(values, list) or len(values) != robot.n:
         return None
-    return dict(zip(robot.joint_names, map(float, values), strict=True))
+    return by_joint(robot.joint_names, values)

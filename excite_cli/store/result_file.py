@@ -13,8 +13,8 @@ from typing import Any
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array
 from excite_cli.atomic import write_atomically
 from excite_cli.excitation.motion import Doubt, Motion, digest_of_array
 from excite_cli.excitation.objective import Stack
@@ -25,7 +25,6 @@ from excite_cli.excitation.result import Result
 from excite_cli.measurement.hdf5_writer import new_hdf5
 from excite_cli.measurement.memory_limit import limited_memory
 from excite_cli.proof.certificate import Worst
-from excite_cli.robot.model import Array
 from excite_cli.store import checked
 from excite_cli.store.own_file import PROGRAM, OwnFile, opened
 from excite_cli.trajectory.catalogue import build_trajectory
@@ -54,7 +53,7 @@ def as_found(motion: Motion, digest: str, samples: Sequence[Array], stored: str)
     return replace(motion.doubted(Doubt.CHANGED), digest=stored)
 
 
-Matrix = NDArray[np.float64]
+Matrix = Array
 
 SCHEMA = 1
 OWN = OwnFile(

@@ -148,10 +148,7 @@ def row_of(record: CaseRecord) -> dict[str, Any]:
 
 
 def _write(path: Path, content: bytes) -> None:
-    def write(temporary: Path) -> None:
-        temporary.write_bytes(content)
-
-    write_atomically(path, write)
+    write_atomically(path, lambda temporary: temporary.write_bytes(content))
 
 
 # A parameter study: whole cases spread over workers, each kept as soon as it is done.

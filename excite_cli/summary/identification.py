@@ -425,7 +425,8 @@ def load_parts(found: LoadIdentification) -> Parts:
 def _load_in_words(found: LoadIdentification) -> str:
     """Mass and centre, from how much data."""
     mass = found.parameters["mass"]
-    centre = ", ".join(with_deviation(1e3 * p.value, 1e3 * p.std) for p in _centre(found))
+    places = [found.parameters[name] for name in ("cx", "cy", "cz")]
+    centre = ", ".join(with_deviation(1e3 * each.value, 1e3 * each.std) for each in places)
     doubt = "" if found.possible else " These values are physically infeasible."
     if any(each.kind == "more_than_a_load" for each in found.findings):
         doubt += " The data contain more than a rigid payload, which the ± do not cover."
@@ -433,10 +434,6 @@ def _load_in_words(found: LoadIdentification) -> str:
         f"{found.link} carries {with_deviation(mass.value, mass.std)} kg with its centre at "
         f"({centre}) mm, from {found.seconds:.3g} s of motion.{doubt}"
     )
-
-
-def _centre(found: LoadIdentification) -> list[Any]:
-    return [found.parameters[name] for name in ("cx", "cy", "cz")]
 
 
 def _load_data(found: LoadIdentification) -> dict[str, Any]:

@@ -1,13 +1,12 @@
 """Simulated runs and what was put into the robot, as tables and as data."""
 
-from collections.abc import Sequence
 from math import isfinite
 from typing import Any
 
 import numpy as np
 
+from excite_cli.diagnosis.records import by_joint
 from excite_cli.fields import data_of
-from excite_cli.robot.model import Array
 from excite_cli.scoring.records import Replay, ReplayedModel, SetPointReplay
 from excite_cli.shown.answer import Answer, Parts, Table, show
 from excite_cli.simulation.simulate import Simulation
@@ -74,9 +73,9 @@ def simulation_answer(found: Simulation, output: str, seed: int) -> Answer:
                 "name": run.name,
                 "samples": len(run.t),
                 "duration": run.duration,
-                "tracking_error": _named(joints, found.tracking[run.name]),
+                "tracking_error": by_joint(joints, found.tracking[run.name]),
                 **(
-                    {"largest_error": _named(joints, found.lag[run.name])}
+                    {"largest_error": by_joint(joints, found.lag[run.name])}
                     if run.name in found.lag
                     else {}
                 ),
@@ -95,10 +94,6 @@ def simulation_parts(found: Simulation) -> Parts:
     records = _records(found)
     lag = [_lag_in_words(found)] if found.lag else []
     return [_run_table(found), *lag, *([_effect_table(records)] if records else [])]
-
-
-def _named(joints: Sequence[str], values: Array) -> dict[str, float]:
-    return dict(zip(joints, map(float, values), strict=True))
 
 
 def _lag_in_words(found: Simulation) -> str:

@@ -150,10 +150,6 @@ class Fade(Trajectory):
         """The motion standing at the posture itself."""
         return np.vstack([self.motion.constant(q), q])
 
-    def sampling_factor(self, samples: int, step: float) -> float | None:
-        """Samples prove nothing between them."""
-        return None
-
 
 def _largest_weight(order: int) -> float:
     """Largest magnitude of a derivative of w over its share of time, 0 to 1."""

@@ -127,10 +127,6 @@ class PointToPoint(Trajectory):
         """At rest at the same posture at both ends."""
         return at_rest_between(q, q)
 
-    def sampling_factor(self, samples: int, step: float) -> float | None:
-        """Samples prove nothing between them."""
-        return None
-
 
 def at_rest_between(start: Array, end: Array) -> Array:
     """Coefficients (6, n) from rest at `start` to rest at `end`, both (n,)."""

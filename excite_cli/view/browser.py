@@ -6,7 +6,6 @@ the controls, moves the robot on, and writes the readout a few times a second.
 
 import contextlib
 import errno
-import importlib
 import io
 import socket
 import time
@@ -17,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from excite_cli.errors import ConfigError, MissingExtraError
+from excite_cli.errors import ConfigError, optional_module
 from excite_cli.excitation.problem import Problem
 from excite_cli.robot.model import Robot
 from excite_cli.trajectory.fade import Segment
@@ -138,7 +137,11 @@ def play_in_browser(
     ConfigError
         The host or the port cannot be used.
     """
-    viser = _viser()
+    viser = optional_module(
+        "viser",
+        "Playing motions in the browser needs viser, which is not installed. Run: "
+        "pip install 'excite-cli[view]' (or take --png or --gif).",
+    )
     times = np.linspace(0.0, 1.0, _SEEN)
     paths = [
         s.trajectory.states(times * s.trajectory.duration, s.coefficients)[0] for s in segments
@@ -250,16 +253,6 @@ class _Player:
             times = np.linspace(0.0, duration, int(np.ceil(duration * _RATE)) + 1)
             self._known[name] = instants_of(self._problem, segment, times)
         return self._known[name]
-
-
-def _viser() -> Any:
-    try:
-        return importlib.import_module("viser")
-    except ImportError as error:
-        raise MissingExtraError(
-            "Playing motions in the browser needs viser, which is not installed. Run: "
-            "pip install 'excite-cli[view]' (or take --png or --gif)."
-        ) from error
 
 
 def _server(viser: Any, serving: Serving, title: str) -> Any:

@@ -130,6 +130,12 @@ def _visuals(robot: Robot) -> tuple[pin.GeometryModel | None, str]:
     return model, f"{', '.join(lacking)} {are} drawn without what cannot be read: {why}"
 
 
+def in_bytes(colour: Colour) -> tuple[int, int, int]:
+    """Each part from 0 to 255."""
+    red, green, blue = (round(255 * x) for x in colour)
+    return red, green, blue
+
+
 def _colour(item: pin.GeometryObject, number: int) -> Colour:
     """That of the URDF's material, or light and dark in turn."""
     if item.overrideMaterial:

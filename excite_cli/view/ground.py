@@ -71,11 +71,9 @@ class GroundPlane:
         floor = (1 - lines[:, None]) * np.array(_FLOOR) + lines[:, None] * np.array(_LINE)
         return np.asarray((1 - kept) * np.array(PAPER) + kept * floor)
 
-    def _away(self, points: Array) -> Array:
-        return np.linalg.norm(points[:, :2] - self._center, axis=1) / self._size
-
     def _kept(self, points: Array) -> Array:
-        share = np.clip((self._away(points) - _FADE[0]) / (_FADE[1] - _FADE[0]), 0.0, 1.0)
+        away = np.linalg.norm(points[:, :2] - self._center, axis=1) / self._size
+        share = np.clip((away - _FADE[0]) / (_FADE[1] - _FADE[0]), 0.0, 1.0)
         return np.asarray(1 - share * share * (3 - 2 * share))
 
 

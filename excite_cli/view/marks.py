@@ -1,14 +1,13 @@
 """Marks over a picture: the nearest distance, the centre of mass, the zero-moment point, words."""
 
-import importlib
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.errors import MissingExtraError
+from excite_cli.errors import optional_module
 from excite_cli.robot.model import Array
-from excite_cli.view.geometry import Colour
+from excite_cli.view.geometry import Colour, in_bytes
 from excite_cli.view.instants import Instants
 from excite_cli.view.rays import Camera
 from excite_cli.view.scene import Scene
@@ -27,12 +26,10 @@ def pillow_part(name: str) -> Any:
     MissingExtraError
         Pillow is not installed.
     """
-    try:
-        return importlib.import_module(f"PIL.{name}")
-    except ImportError as error:
-        raise MissingExtraError(
-            "Pictures need Pillow, which is not installed. Run: pip install 'excite-cli[view]'"
-        ) from error
+    return optional_module(
+        f"PIL.{name}",
+        "Pictures need Pillow, which is not installed. Run: pip install 'excite-cli[view]'",
+    )
 
 
 class Marks:
@@ -112,9 +109,9 @@ class Marks:
         radius = 6.5 * self._unit * _FINER
         x, y = middle * _FINER
         box = (x - radius, y - radius, x + radius, y + radius)
-        pen.ellipse(box, fill=_eight(_PAPER), outline=_eight(_INK), width=round(radius / 5))
-        pen.pieslice(box, 0, 90, fill=_eight(_INK))
-        pen.pieslice(box, 180, 270, fill=_eight(_INK))
+        pen.ellipse(box, fill=in_bytes(_PAPER), outline=in_bytes(_INK), width=round(radius / 5))
+        pen.pieslice(box, 0, 90, fill=in_bytes(_INK))
+        pen.pieslice(box, 180, 270, fill=in_bytes(_INK))
 
     def _dashes(self, pen: Any, start: Array, end: Array) -> None:
         length = float(np.linalg.norm(end - start))
@@ -125,25 +122,25 @@ class Marks:
 
     def _line(self, pen: Any, ends: Array, width: float, colour: Colour) -> None:
         places = [tuple(end * _FINER) for end in ends]
-        pen.line(places, fill=_eight(colour), width=round(width * self._unit * _FINER))
+        pen.line(places, fill=in_bytes(colour), width=round(width * self._unit * _FINER))
 
     def _dot(self, pen: Any, place: Array, radius: float, colour: Colour) -> None:
         reach = radius * self._unit * _FINER
         x, y = place * _FINER
-        pen.ellipse((x - reach, y - reach, x + reach, y + reach), fill=_eight(colour))
+        pen.ellipse((x - reach, y - reach, x + reach, y + reach), fill=in_bytes(colour))
 
     def _diamond(self, pen: Any, place: Array, radius: float, colour: Colour) -> None:
         reach = radius * self._unit * _FINER
         x, y = place * _FINER
         corners = [(x - reach, y), (x, y - reach), (x + reach, y), (x, y + reach)]
-        pen.polygon(corners, fill=_eight(colour))
+        pen.polygon(corners, fill=in_bytes(colour))
 
     def _write(self, pen: Any, place: Array, text: str, colour: Colour, anchor: str) -> None:
         pen.text(
             (float(place[0]), float(place[1])),
             text,
             font=self._font,
-            fill=_eight(colour),
+            fill=in_bytes(colour),
             anchor=anchor,
             stroke_width=round(2 * self._unit),
             stroke_fill=(255, 255, 255),
@@ -158,8 +155,3 @@ def caption_of(instants: Instants, instant: int, duration: float) -> str:
     distance = 1000 * instants.nearest.distances[instant]
     label = instants.nearest.labels[instant].replace("–", "-")  # the font has no dash
     return f"{words}, nearest: {label}, {distance:.0f} mm"
-
-
-def _eight(colour: Colour) -> tuple[int, int, int]:
-    red, green, blue = (round(255 * x) for x in colour)
-    return red, green, blue

@@ -3,7 +3,6 @@
 Embree does the work on the processor, so that pictures need no display and no graphics driver.
 """
 
-import importlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from excite_cli.errors import MissingExtraError
+from excite_cli.errors import optional_module
 from excite_cli.robot.model import Array
 from excite_cli.view.surface import Surface
 
@@ -37,14 +36,12 @@ def embree_part(name: str) -> Any:
     MissingExtraError
         embreex is not installed.
     """
-    try:
-        return importlib.import_module(f"embreex.{name}")
-    except ImportError as error:
-        raise MissingExtraError(
-            "Pictures of the robot need embreex, which is not installed. Run: "
-            "pip install 'excite-cli[view]' (there are no wheels for Linux on ARM; `excite view` "
-            "in the browser works there)."
-        ) from error
+    return optional_module(
+        f"embreex.{name}",
+        "Pictures of the robot need embreex, which is not installed. Run: "
+        "pip install 'excite-cli[view]' (there are no wheels for Linux on ARM; `excite view` "
+        "in the browser works there).",
+    )
 
 
 class Tracer:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from excite_cli.robot.model import Array
-from excite_cli.view.geometry import Colour
+from excite_cli.view.geometry import Colour, in_bytes
 from excite_cli.view.instants import Instants
 from excite_cli.view.scene import Scene
 from excite_cli.view.studio import BOX_COLOUR
@@ -81,7 +81,7 @@ class SceneNodes:
         near = {k for k, capsule in enumerate(self._scene.capsules) if capsule in at}
         if near != self._near:
             for index in near ^ self._near:
-                self._capsules[index].color = _eight(NEAREST if index in near else CAPSULE)
+                self._capsules[index].color = in_bytes(NEAREST if index in near else CAPSULE)
             self._near = near
 
     def _show_mass(self, instants: Instants, instant: int) -> None:
@@ -136,7 +136,7 @@ class SceneNodes:
             name,
             surface.points.astype(np.float32),
             surface.faces.astype(np.uint32),
-            color=_eight(colour),
+            color=in_bytes(colour),
             opacity=opacity,
             side="double",
             cast_shadow=opacity is None,
@@ -144,11 +144,13 @@ class SceneNodes:
         )
 
     def _ball(self, name: str, radius: float, colour: Colour) -> Any:
-        return self._api.add_icosphere(name, radius=radius, color=_eight(colour), cast_shadow=False)
+        return self._api.add_icosphere(
+            name, radius=radius, color=in_bytes(colour), cast_shadow=False
+        )
 
     def _segment(self, name: str, colour: Colour, width: float) -> Any:
         return self._api.add_line_segments(
-            name, np.zeros((1, 2, 3), dtype=np.float32), _eight(colour), thickness=width,
+            name, np.zeros((1, 2, 3), dtype=np.float32), in_bytes(colour), thickness=width,
             thickness_units="screen",
         )  # fmt: skip
 
@@ -176,8 +178,3 @@ def _quaternion(rotation: Array) -> Array:
         ]
     )
     return np.asarray(rows[largest] / np.linalg.norm(rows[largest]))
-
-
-def _eight(colour: Colour) -> tuple[int, int, int]:
-    red, green, blue = (round(255 * x) for x in colour)
-    return red, green, blue

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from excite_cli.arrays import Array, Indices
 
 _CREASE = np.cos(np.radians(35.0))  # faces that meet at less are one smooth surface
 _HALF_CREASE = np.cos(np.radians(17.5))

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import excite_cli
-from excite_cli.errors import MissingExtraError
+from excite_cli.errors import optional_module
 from excite_cli.workers.base import (
     Answer,
     Function,
@@ -112,18 +112,16 @@ class Cluster(Workers):
     def __init__(
         self, address: str, threads: int = 1, warn: Callable[[str], None] = lambda text: None
     ) -> None:
-        try:
-            from distributed import Client
-        except ImportError as error:
-            raise MissingExtraError(
-                "--scheduler needs dask. Install it with: pip install 'excite-cli[cluster]'"
-            ) from error
+        library = optional_module(
+            "distributed",
+            "--scheduler needs dask. Install it with: pip install 'excite-cli[cluster]'",
+        )
         self.address, self._threads = address, threads
         for name in _TALKATIVE:  # what matters of it we say ourselves
             logging.getLogger(f"distributed{name}").setLevel(logging.CRITICAL)
         try:
             asyncio.run(asyncio.wait_for(_greet(address), _ANSWER))
-            self._client = Client(address, timeout=_ANSWER, set_as_default=False)
+            self._client = library.Client(address, timeout=_ANSWER, set_as_default=False)
         except Exception as error:  # what else listens there may answer anything
             raise ClusterError(_no_scheduler(address, error)) from error
         try:

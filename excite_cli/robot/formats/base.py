@@ -9,9 +9,9 @@ from typing import ClassVar
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from excite_cli.arrays import Array, Indices
 from excite_cli.robot.formats.kept_meshes import keep_mesh
 
 
@@ -92,7 +92,6 @@ class RobotFormat(ABC):
 
 # Parts of a URDF that is written from another format.
 
-Array = NDArray[np.float64]
 Element = ElementTree.Element
 
 _BALL_POINTS = 200
@@ -147,7 +146,7 @@ def capsule(radius: float, length: float) -> Iterator[tuple[float, Element]]:
         yield side * length, ElementTree.Element("sphere", radius=repr(radius))
 
 
-def ellipsoid(radii: Array) -> tuple[Array, NDArray[np.intp]]:
+def ellipsoid(radii: Array) -> tuple[Array, Indices]:
     """Corners (N, 3) [m] and triangles (F, 3) of an ellipsoid."""
     k = np.arange(_BALL_POINTS) + 0.5
     z, angle = 1 - 2 * k / _BALL_POINTS, np.pi * (1 + 5**0.5) * k
@@ -156,7 +155,7 @@ def ellipsoid(radii: Array) -> tuple[Array, NDArray[np.intp]]:
     return points, ConvexHull(points).simplices.astype(np.intp)
 
 
-def mesh(points: Array, faces: NDArray[np.intp], made: set[str]) -> Element:
+def mesh(points: Array, faces: Indices, made: set[str]) -> Element:
     """A mesh as a file of the cache, whose path joins `made`."""
     path = keep_mesh(points, faces)
     made.add(str(path))

@@ -28,7 +28,7 @@ def keep_mesh(points: NDArray[np.float64], faces: NDArray[Any], folder: Path | N
     try:
         if not is_sound(path):
             path.parent.mkdir(parents=True, exist_ok=True)
-            write_atomically(path, lambda temporary: _fill(temporary, content))
+            write_atomically(path, lambda temporary: temporary.write_bytes(content))
     except (OSError, FileError) as error:
         raise RobotError(
             f"meshes of converted robots are kept in {path.parent}, which cannot be written: "
@@ -60,7 +60,3 @@ def _stl(points: NDArray[np.float64], faces: NDArray[Any]) -> bytes:
     )
     records["corners"] = points[faces]
     return b"\0" * 80 + struct.pack("<I", len(faces)) + records.tobytes()
-
-
-def _fill(path: Path, content: bytes) -> None:
-    path.write_bytes(content)

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-from excite_cli.errors import MissingExtraError, RobotError
+from excite_cli.arrays import Array
+from excite_cli.errors import RobotError, optional_module
 from excite_cli.robot.allowed_files import allowed_files
 from excite_cli.robot.formats.base import (
     ConversionRequest,
@@ -33,7 +33,6 @@ from excite_cli.robot.formats.mjcf_sources import Ranges, compiled, mjcf_sources
 from excite_cli.robot.loops import TAG
 from excite_cli.robot.urdf_check import root_tag
 
-Array = NDArray[np.float64]
 Element = ElementTree.Element
 
 _HELD = 1e6  # [N·m·s/rad or N·s/m] damping beyond which a joint stands still
@@ -73,14 +72,11 @@ class Mjcf(RobotFormat):
 
 
 def _library() -> Any:
-    try:
-        import mujoco
-    except ImportError as error:
-        raise MissingExtraError(
-            "Files of MJCF need mujoco, which is not installed. Run: pip install "
-            "'excite-cli[formats]'."
-        ) from error
-    return mujoco
+    return optional_module(
+        "mujoco",
+        "Files of MJCF need mujoco, which is not installed. Run: pip install "
+        "'excite-cli[formats]'.",
+    )
 
 
 class _Writer:

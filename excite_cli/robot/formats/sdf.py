@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from excite_cli.arrays import Array
 from excite_cli.errors import RobotError
 from excite_cli.robot.formats.base import (
     ConversionRequest,
@@ -32,7 +32,6 @@ from excite_cli.robot.formats.base import (
 from excite_cli.robot.loops import TAG
 from excite_cli.robot.urdf_check import root_tag
 
-Array = NDArray[np.float64]
 Element = ElementTree.Element
 
 _WORLD, _MODEL = "world", "__model__"

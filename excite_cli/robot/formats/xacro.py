@@ -56,7 +56,10 @@ class Xacro(RobotFormat):
         allowed = allowed_files(path, asked.package_dirs)
         packages = _Packages(path, allowed, asked.absent)
         _replace(library, allowed, packages.find)
-        arguments = {name: _written(value) for name, value in asked.arguments.items()}
+        arguments = {
+            name: str(value).lower() if isinstance(value, bool) else str(value)
+            for name, value in asked.arguments.items()
+        }
         try:
             expanded = library.process_file(str(path), mappings=arguments).toxml()
         except Exception as error:  # xacro raises whatever an expression raises
@@ -213,11 +216,6 @@ def _own_error(error: BaseException) -> RobotError | None:
     while found is not None and not isinstance(found, RobotError):
         found = found.__cause__ or getattr(found, "exc", None) or found.__context__
     return found
-
-
-def _written(value: object) -> str:
-    """An argument as xacro takes it."""
-    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _variable(name: str) -> str:
