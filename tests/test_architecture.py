@@ -79,6 +79,29 @@ def test_commands_know_no_room_but_the_front_door() -> None:
     assert set(contract["forbidden_modules"]) == rooms - known
 
 
+# The linter does not see what is imported by its name.
+OPTIONAL = {
+    "PIL": {"view"},
+    "distributed": {"workers"},
+    "embreex": {"view"},
+    "jinja2": {"report"},
+    "matplotlib": {"report"},
+    "mujoco": {"robot", "simulation"},
+    "pandas": {"shown"},
+    "rosbags": {"measurement", "motion_formats"},
+    "viser": {"view"},
+}
+
+
+def test_optional_libraries_are_known_to_their_rooms_alone() -> None:
+    rooms: dict[str, set[str]] = {}
+    for path in sorted((ROOT / "excite_cli").rglob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        for name in re.findall(r"optional_module\(\s*f?\"(\w+)", text):
+            rooms.setdefault(name, set()).add(path.relative_to(ROOT / "excite_cli").parts[0])
+    assert rooms == OPTIONAL
+
+
 def test_commands_parse_call_and_show() -> None:
     for path in sorted((ROOT / "excite_cli" / "cli").glob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
