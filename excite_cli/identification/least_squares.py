@@ -130,14 +130,11 @@ def _rms(factors: Sequence[Array], x: Array, count: Array) -> Array:
 def _by_noise(
     factors: Sequence[Array], count: Array, floor: Array, extra: Array, method: Method
 ) -> tuple[Array, Solution]:
-    """Alternate between x and the noise of every joint until it settles.
-
-    It begins without the prior: what that forbids would count as noise, in which it stays hidden.
-    """
+    """Alternate between x and the noise of every joint until it settles."""
     p, total = factors[0].shape[-1] - 1, int(count.sum())
     freedom = np.maximum(count - p * count / max(total, 1), 1.0)  # less its share of parameters
     sigma = np.ones(len(count))
-    solution = solve(stacked(factors, sigma, extra[:0]))
+    solution = solve(stacked(factors, sigma, extra[:0] if method == "ols" else extra))
     if method == "ols" and not len(extra):
         return sigma, solution
     for _ in range(_ROUNDS):
