@@ -55,6 +55,7 @@ def forecast(model: Model | str | Path, job: Motions, *, tell: Tell = log_note) 
         dict(zip(given.joint_names, joints, strict=True)),
         None if stored.error is None else stored.error.mean_relative_moving,
         torque_units(stored.robot),
+        trust.usual(),
     )
 
 

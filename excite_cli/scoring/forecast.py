@@ -48,7 +48,8 @@ class Forecast(Shown):
     """The error of `model` to expect where joints move, on the motion of the file `job`.
 
     It is `seconds` long. `joints` by name; `made`: error when the model was made, on data held out,
-    as a share of the torque (None if not known). `torque_units` of the joints.
+    as a share of the torque (None if not known). `torque_units` of the joints. `usual`: what the
+    same formula expects on the model's own data, those held out if any.
     """
 
     model: str
@@ -57,6 +58,7 @@ class Forecast(Shown):
     joints: dict[str, JointForecast]
     made: float | None
     torque_units: tuple[str, ...]
+    usual: float = nan
 
     @property
     def mean_share(self) -> float:
@@ -72,7 +74,8 @@ class Forecast(Shown):
     @property
     def good(self) -> bool:
         """Whether the error to expect is about that of the model's own data."""
-        return self.made is None or not self.mean_share > TOLERATED * self.made
+        own = [x for x in (self.made, self.usual) if x is not None and np.isfinite(x)]
+        return not own or not self.mean_share > TOLERATED * max(own)
 
 
 def joint_forecasts(validity: Validity, states: States, deviation: Array) -> list[JointForecast]:

@@ -222,10 +222,27 @@ class Trust:
         self.validity = validity_of(stored.traces, stored.processing)
         # B (P + k, m) of the covariance B Bᵀ of φ and the effects; None where it is not known.
         self.root = self._root_of(stored)
+        self._traces = stored.traces
 
     def deviation(self, series: Series, found: Prediction) -> Array:
         """s (T, n) [N·m] (N) of the torque that was `found`."""
         return self.validity.deviation(states_of(series, found), self.by_parameters(series))
+
+    def usual(self) -> float:
+        """RMS of s over RMS of the torque where joints move, mean over joints, on the own data.
+
+        On those held out, if any.
+        """
+        squares, torque = 0.0, 0.0
+        held = [trace for trace in self._traces if trace.held_out]
+        for trace in held or self._traces:
+            states = States(*(getattr(trace, name) for name in _NAMES))
+            s = self.validity.deviation(states, self.by_parameters(_series_of(trace)))
+            moves = self.validity.moves(trace.v) & np.isfinite(s)
+            squares = squares + np.square(np.where(moves, s, 0.0)).sum(axis=0)
+            torque = torque + np.square(np.where(moves, trace.predicted, 0.0)).sum(axis=0)
+        known = np.asarray(torque) > 0.0
+        return float(np.mean(np.sqrt(np.asarray(squares)[known] / np.asarray(torque)[known])))
 
     def by_parameters(self, series: Series) -> Array:
         """d (T, n) [N·m] (N): of the torque by the covariance of the parameters; 0 if unknown."""

@@ -40,7 +40,12 @@ def forecast_parts(found: Forecast) -> Parts:
 
 
 def _sentence(found: Forecast) -> str:
-    made = "" if found.made is None else f" ({percent(found.made)} on its own held-out data)"
+    made = ""
+    if found.made is not None:
+        made = f" ({percent(found.made)} on its own held-out data"
+        made += (
+            f", where {percent(found.usual)} would be expected)" if isfinite(found.usual) else ")"
+        )
     told = f"Expect an error of {percent(found.mean_share)} of the torque where joints move{made}."
     if not found.outside:
         return f"{told} All joints stay within the positions, speeds and loads of the model's data."

@@ -67,6 +67,10 @@ def test_more_error_than_usual_is_a_bad_answer() -> None:
     assert not forecast_answer(made).good
     assert forecast_answer(replace(made, made=0.08)).good
     assert forecast_answer(replace(made, made=None)).good
+    # What is expected of its own data, too, is no more error than usual.
+    answer = forecast_answer(replace(made, usual=0.09))
+    assert answer.good
+    assert "(5.00% on its own held-out data, where 9.00% would be expected)" in str(answer.parts[0])
     table = str(forecast_answer(made).parts[1])
     assert "3.0 x" in table
 
