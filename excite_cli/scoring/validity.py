@@ -60,8 +60,6 @@ _MOST = 9.0  # h: more is another fault than a fit's
 _SHARP = 12.0  # Hz: cut-off of torques that no filter averages
 _REVERSES = 0.5  # ρ that some sample must have, or the data show no reversal
 _AT_ONCE = 2000  # states whose columns are in memory
-
-
 _NAMES = ("q", "v", "a", "load", "predicted")  # of traces, for `States`
 
 
@@ -159,7 +157,7 @@ def validity_of(traces: Sequence[TorqueTrace], processing: Processing | None) ->
 
 def _against(validity: Validity, trace: TorqueTrace) -> Array:
     """e²/s² (T, n) of a trace where joints move, else NaN."""
-    s = validity.deviation(States(*(getattr(trace, name) for name in _NAMES)))
+    s = validity.deviation(_states_in(trace))
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.square((trace.measured - trace.predicted) / s)
     return np.where(validity.moves(trace.v), ratio, nan)
@@ -199,6 +197,10 @@ def _variances(columns: Array, left: Array) -> Array:
     return coefficients
 
 
+def _states_in(trace: TorqueTrace) -> States:
+    return States(trace.q, trace.v, trace.a, trace.load, trace.predicted)
+
+
 def states_of(series: Series, found: Prediction) -> States:
     """Of a series and what a model predicts for it."""
     return States(series.q, series.v, series.a, found.load, found.torque)
@@ -231,18 +233,19 @@ class Trust:
     def usual(self) -> float:
         """RMS of s over RMS of the torque where joints move, mean over joints, on the own data.
 
-        On those held out, if any.
+        On those held out, if any; NaN where nothing moves.
         """
         squares, torque = 0.0, 0.0
         held = [trace for trace in self._traces if trace.held_out]
         for trace in held or self._traces:
-            states = States(*(getattr(trace, name) for name in _NAMES))
-            s = self.validity.deviation(states, self.by_parameters(_series_of(trace)))
+            d = self.by_parameters(_series_of(trace))
+            s = self.validity.deviation(_states_in(trace), d)
             moves = self.validity.moves(trace.v) & np.isfinite(s)
             squares = squares + np.square(np.where(moves, s, 0.0)).sum(axis=0)
             torque = torque + np.square(np.where(moves, trace.predicted, 0.0)).sum(axis=0)
         known = np.asarray(torque) > 0.0
-        return float(np.mean(np.sqrt(np.asarray(squares)[known] / np.asarray(torque)[known])))
+        shares = np.sqrt(np.asarray(squares)[known] / np.asarray(torque)[known])
+        return float(shares.mean()) if known.any() else nan
 
     def by_parameters(self, series: Series) -> Array:
         """d (T, n) [N·m] (N): of the torque by the covariance of the parameters; 0 if unknown."""
