@@ -42,7 +42,8 @@ def stored(robot: Robot, model: IdentifiedModel) -> StoredModel:
     load = RigidBody(robot, model.phi, q, v, a).load
     left = (0.1 + 0.2 * np.abs(v)) * rng.normal(size=(300, n))
     every = np.ones((300, n), dtype=bool)
-    trace = TorqueTrace("run", False, t, q, v, a, load, load + left, every, load)
+    told = load + 2.0 * np.sign(v) + 0.5 * v
+    trace = TorqueTrace("run", False, t, q, v, a, load, told + left, every, told)
     size = find_base_parameters(robot).rank + len(model.values)
     factor = np.triu(rng.normal(size=(size, size))) + 20.0 * np.eye(size)
     return StoredModel(
