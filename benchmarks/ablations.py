@@ -29,7 +29,7 @@ OFF: dict[str, dict[str, float]] = {
     "SMALLEST": {"SMALLEST": 0.0},
     "PARENT_PRICE": {"PARENT_PRICE": 25.0},  # about its own price
     "ON_FEWER_ROWS": {"ON_FEWER_ROWS": 0.0},
-    "FARTHER": {"FARTHER": NO},
+    "MUCH": {"MUCH": NO},
     "LEAST_SIDE": {"LEAST_SIDE": 0.0},
     "RUNS_OF_A_DRIFT": {"RUNS_OF_A_DRIFT": 1},
     "CONFIDENCE": {"CONFIDENCE": 0.5},

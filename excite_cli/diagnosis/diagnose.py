@@ -59,6 +59,8 @@ from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import declared_effects
 from excite_cli.identification.declared_states import check_declared_runs, check_left_to_fit
 from excite_cli.identification.filter_bias import filter_findings, fitted_behind
+from excite_cli.identification.fit import effect_parameter_names
+from excite_cli.identification.fit_words import not_seen
 from excite_cli.identification.held_out_copies import refuse_held_out_copies
 from excite_cli.identification.identified_model import IdentifiedModel
 from excite_cli.identification.noise_floor import NoiseFloor, noise_floor
@@ -144,8 +146,8 @@ def diagnose(
     progress("naming", 8)
     traced, book, compared = _needed(traced, bodies, spec)
     del bodies
+    final = final_fit(traced, regression(traced, model))
     model = traced.model
-    final = final_fit(traced, regression(traced))
     floor = noise_floor(parts.training, processing)
     models = both_models(traced, final.parameters)
     trained = HeldOutRuns(robot, traced.data.runs)
@@ -193,6 +195,10 @@ def diagnose(
             *_filter_bias(model, models[1], spec, parts.training, processing),
             *cut_short,
             *differences_between_runs(traced),
+            *not_seen(
+                effect_parameter_names((*model.declared, *traced.effects), robot.joint_names),
+                final.seen[base.rank :],
+            ),
             *_noticed(assumed, floor, robot, parts.training),
         ),
         processing=_choices(processing, traced, parts, training),

@@ -1,12 +1,20 @@
 """How far the data reach: what would be large only where they do not is not known from them.
 
-An effect of size θ has the torque C(θ) in the data and C'(θ) along a usual motion. Where
-RMS C' > 3 RMS C and RMS C' is more than half of all torque that was seen of the joint, it stands
-for something else near by: cables of a wrist that crept over a twentieth of its range predicted
-every second of two recordings, and 40 times the torque of a third.
+An effect of size θ has the torque C θ in the data and C' θ along a usual motion. Of it, friction,
+offset and rotor of the same joint take up what they can: with their columns T and T' and the share
+w = `rules.IMAGINED` that a usual motion has beside the data in a fit (`weighted_fit`),
+
+    B = argmin ms(C − T B) + w ms(C' − T' B),   R = C − T B,   R' = C' − T' B.
+
+So the effect adds R θ to the textbook's model in the data, and R' θ along the motion. Where
+w ms(R' θ) > ms(R θ), the data have less to say of it than what is imagined. If R' θ is more than
+`rules.MUCH` of all torque that was seen of the joint, too, it stands for something else near by:
+cables of a wrist that crept over a twentieth of its range predicted every second of two recordings,
+and 40 times the torque of a third.
 """
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -61,6 +69,7 @@ class UsualMotion:
             a[:, j] = -scale * (np.sin(angle) @ (size * w**2))
         body = RigidBody(robot, phi, q, v, a)
         self.signals = Signals(t, q, v, a, body.load, body.load, body)
+        self._after = replace(self.signals, start=max((each.start for each in seen), default=0.0))
 
     def gram(self, model: DeclaredModel, effects: Sequence[Effect]) -> Array:
         """Mean over time (n, k, k) of products of the columns of every joint.
@@ -76,10 +85,9 @@ class UsualMotion:
         every = np.concatenate(own, axis=2).swapaxes(0, 1)
         return np.stack([each.T @ each for each in every]) / every.shape[1]
 
-    def squares(self, effect: Effect) -> Array:
-        """Mean over time (rows, p, p) of products of the columns: θᵀ S θ is the mean square."""
-        columns = effect.columns(self.signals)
-        return np.asarray(np.einsum("trp,trq->rpq", columns, columns) / len(columns))
+    def columns(self, effect: Effect) -> Array:
+        """Columns (T, rows, p) of an effect, at the time of the last recording."""
+        return effect.columns(self._after)
 
 
 def torque_seen(data: TrainingData) -> Array:
@@ -92,10 +100,10 @@ def torque_seen(data: TrainingData) -> Array:
 
 
 class Reach:
-    """Judges fitted sizes of candidates; those `always` known, which every robot has, may be any.
+    """Judges fitted sizes of candidates; those `always` known, one joint's each, may be any.
 
-    Nor is anything said of what some runs have, what follows time or a column of the log, or how
-    bodies and the base are: those are known from all joints.
+    Nor is anything said of what some runs have, what follows a column of the log, or how bodies and
+    the base are: those are known from all joints.
     """
 
     def __init__(
@@ -108,6 +116,9 @@ class Reach:
         self._candidates, self._data, self._usual = candidates, data, usual
         self._torque = torque_seen(data)
         self._squares: dict[int, tuple[Array, Array] | None] = dict.fromkeys(always)
+        self._plain: dict[int, list[Candidate]] = {}
+        for i in always:
+            self._plain.setdefault(candidates[i].rows[0], []).append(candidates[i])
 
     def why_not(self, i: int, values: Array) -> str:
         """Why candidate i cannot be known to be of these values; empty if it can."""
@@ -121,28 +132,42 @@ class Reach:
             for each in found
         )
         torque = self._torque[list(self._candidates[i].rows)]
-        beyond = np.flatnonzero((usual > rules.FARTHER * seen) & (usual > rules.MUCH * torque))
+        unknown = (rules.IMAGINED * usual**2 > seen**2) & (usual > rules.MUCH * torque)
+        beyond = np.flatnonzero(unknown)
         if not len(beyond):
             return ""
         k = beyond[np.argmax(usual[beyond])]
         return (
-            f"its torque would be {usual[k]:.3g} over the joint's range and speed, where it is "
-            f"{seen[k]:.3g} in the data and all torque {torque[k]:.3g}"
+            f"beside friction and offset it would be {usual[k]:.3g} over the joint's range and "
+            f"speed, where it is {seen[k]:.3g} in the data and all torque {torque[k]:.3g}"
         )
 
     def _both(self, c: Candidate) -> tuple[Array, Array] | None:
-        """Mean squares along the usual motion and in the data; None: nothing is said of it."""
+        """Mean squares (rows, p, p) of R' and of R; None: nothing is said of it."""
         effect = c.effect
         of_joints = effect.scope in ("joint", "pair") and not effect.carried
-        if not (of_joints and is_steady(effect)):
+        if not of_joints or effect.runs or effect.covariate:
             return None
-        usual = self._usual.squares(effect)
-        if not np.isfinite(usual).all():
+        columns = self._usual.columns(effect)
+        if not np.isfinite(columns).all():
             return None
-        seen, counts = np.zeros_like(usual), np.zeros(len(c.rows))
-        for columns, run in zip(c.columns, self._data.runs, strict=True):
-            usable = run.usable[:, list(c.rows)]
-            own = columns * usable[:, :, None]
-            seen += np.einsum("trp,trq->rpq", own, own)
-            counts += usable.sum(axis=0)
-        return usual, seen / np.maximum(counts, 1)[:, None, None]
+        both = [self._beyond_the_plain(c, k, columns[:, k]) for k in range(len(c.rows))]
+        usual, seen = zip(*both, strict=True)
+        return np.stack(usual), np.stack(seen)
+
+    def _beyond_the_plain(self, c: Candidate, k: int, usual: Array) -> tuple[Array, Array]:
+        """Mean squares (p, p) of R' and R in its row k; `usual` (T, p) are its columns there."""
+        joint, width = c.rows[k], usual.shape[1]
+        plain = self._plain.get(joint, [])
+        along = np.concatenate([usual, *(self._usual.columns(p.effect)[:, 0] for p in plain)], 1)
+        gram, count = np.zeros((along.shape[1],) * 2), 0
+        for i, run in enumerate(self._data.runs):
+            own = [c.columns[i][:, k], *(p.columns[i][:, 0] for p in plain)]
+            rows = np.concatenate(own, axis=1)[run.usable[:, joint]]
+            gram += rows.T @ rows
+            count += len(rows)
+        seen, there = gram / max(count, 1), along.T @ along / len(along)
+        both = seen + rules.IMAGINED * there
+        taken = np.linalg.lstsq(both[width:, width:], both[width:, :width], rcond=None)[0]
+        change = np.vstack([np.eye(width), -taken])
+        return change.T @ there @ change, change.T @ seen @ change

@@ -12,15 +12,19 @@ is viscous and Coulomb friction is a question of the straight line through all o
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from excite_cli.arrays import Array, Mask
+from excite_cli.diagnosis.modelled_run import DeclaredModel
 from excite_cli.diagnosis.search_result import SearchResult
+from excite_cli.dynamics.pseudo_inertia import InertialPrior
 from excite_cli.effects.judgement import half_of
+from excite_cli.identification.factors import solve, triangle_of, undecided
 from excite_cli.identification.fit import usual_sizes
 from excite_cli.identification.least_squares import LinearFit, fit_rows
+from excite_cli.identification.prior import as_wide_as_needed
 from excite_cli.identification.regression import places_of, width_of
 
 # Relative sd of every size, beside what noise says: filters, differentiated positions and motion
@@ -38,24 +42,37 @@ class FinalFit:
     seen: Mask
 
 
-def regression(traced: SearchResult) -> LinearFit:
-    """What was found beside the declared model, by the regression of `identify` (`wls`)."""
-    known, effects = traced.model.known, (*traced.model.declared, *traced.effects)
-    wide = np.pad(known[:, :-1], ((0, 0), (0, width_of(traced.effects))))
+def regression(traced: SearchResult, declared: DeclaredModel) -> LinearFit:
+    """What was found beside the `declared` model, by the regression of `identify` (`wls`).
+
+    Where the user leaves the inertias to the data, their prior is as wide as this fit asks for.
+    """
+    effects = (*declared.declared, *traced.effects)
+    data = traced.data.rows(traced.candidates, traced.chosen)
+    sizes = usual_sizes(declared.robot, declared.base, effects)
     rows, said = traced.imagined()
-    prior = np.vstack([wide, rows]), np.append(known[:, -1], said)
-    return fit_rows(
-        traced.data.rows(traced.candidates, traced.chosen),
-        "wls",
-        prior if len(prior[0]) else None,
-        usual_sizes(traced.model.robot, traced.model.base, effects),
-    )
+
+    def fitted(model: DeclaredModel) -> LinearFit:
+        known = np.insert(model.known, [-1] * width_of(traced.effects), 0.0, axis=1)
+        prior = np.vstack([known[:, :-1], rows]), np.append(known[:, -1], said)
+        found = fit_rows(data, "wls", prior if len(prior[0]) else None, sizes)
+        # Where data do not decide, what is imagined does, and tells nothing of it.
+        told = triangle_of(np.concatenate([found.factor, known]))
+        shown = found.shown + undecided(told, found.x)
+        return replace(found, shown=shown, seen=solve(told).seen)
+
+    def beside(prior: InertialPrior) -> tuple[Array, LinearFit]:
+        found = fitted(replace(declared, prior=prior))
+        return found.x, found
+
+    if declared.prior is None or not declared.vague:
+        return fitted(declared)
+    return as_wide_as_needed(declared.prior, declared.base, beside)[1]
 
 
 def final_fit(traced: SearchResult, linear: LinearFit) -> FinalFit:
     """What is told of a regression of what was found."""
-    parameters = linear.x
-    covariance = np.where(np.isfinite(linear.covariance), linear.covariance, 0.0)
+    parameters, covariance = linear.x, linear.shown.copy()
     places = places_of(traced.effects, len(parameters))
     for k, (effect, own) in enumerate(zip(traced.effects, places, strict=True)):
         error = np.hypot(effect.model_error(parameters[own]), _SYSTEMATIC * parameters[own])

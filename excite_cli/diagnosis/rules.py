@@ -20,13 +20,10 @@ PARENT_PRICE = 4.5
 # 5 % too large, one was given an offset of the vertical force without.
 ON_FEWER_ROWS = 25.0
 
-# What would have `FARTHER` times the torque along a usual motion that it has in the data, and more
-# than `MUCH` of all torque seen of its joint, is not known from these data. Of 366 effects beyond
-# the textbook's in 39 robots of the battery two, and no helpful one, are beyond both (they add 0.5
-# and 0.7 to the logarithm of a held-out error); three harmful and four helpful ones with 0.3 in
-# place of 0.5; eight and 19 with 0.1. Imagined samples do not say it: without it a joint with a
-# wave was given a linear function of its angle, too, and 27 times the error.
-FARTHER, MUCH = 3.0, 0.5
+# What would add more than this share of all torque seen of its joint to the textbook's model along
+# a usual motion, where the data say less of it than what is imagined, is not known from these data
+# (`extrapolation`).
+MUCH = 0.5
 
 # What has less than this share of its energy in the seconds that are fitted is unknown there: it is
 # judged by what a fit to all explains. Of pushes of half a second in campaigns of a UR10 (seeds

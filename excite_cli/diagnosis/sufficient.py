@@ -54,7 +54,8 @@ def with_everyday(traced: SearchResult, chosen: Sequence[int]) -> list[int]:
         (at,) = white.blocks[i]
         own = schur.diagonal[at - white.fixed] > _ITS_OWN * white.total[at, at]
         effect = candidates[i].effect
-        if own and effect.place not in taken and not effect.data_defect:
+        wanted = not effect.data_defect if own else i in traced.plain
+        if wanted and effect.place not in taken:
             found.append(i)
     return those_that_matter(traced, found)
 

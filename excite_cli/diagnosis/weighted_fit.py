@@ -22,7 +22,7 @@ from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.noise_model import NoiseModel
 from excite_cli.diagnosis.schur import RIDGE, Cholesky
 from excite_cli.diagnosis.training import Columns, TrainingData
-from excite_cli.identification.least_squares import EXACT
+from excite_cli.identification.least_squares import AT_FIRST, EXACT
 
 _ROUNDS, _SETTLED = 30, 1e-6
 _ROUNDING = 1e-14  # of the largest eigenvalue
@@ -81,7 +81,7 @@ class WeightedFit:
             own.append((np.append(where[active[there]], count), rest))
         share = 1.0 - count / max(float(np.sum(self._counts)), 1.0)
         freedom = np.maximum(self._counts * share, 1.0)
-        sigma = np.ones(len(own)) if near is None else near
+        sigma = AT_FIRST / EXACT * self._floor if near is None else near
         x = _solved(prior, own, sigma)
         for _ in range(_ROUNDS if near is None else 0):
             both = np.append(-x, 1.0)

@@ -73,16 +73,33 @@ def stacked(factors: Sequence[Array], sigma: Array, extra: Array | None = None) 
 
 def solve(factor: Array) -> Solution:
     """Least squares from R (p+1, p+1) of [C τ], columns scaled to unit norm."""
-    triangle, right = factor[:-1, :-1], factor[:-1, -1]
-    norms = np.linalg.norm(triangle, axis=0)
-    scale = np.where(norms > 0, norms, 1.0)
-    left, values, directions = np.linalg.svd(triangle / scale)
-    kept = values > BLIND * max(float(values[0]) if len(values) else 0.0, 1e-300)
+    scale, left, values, directions, kept = _decomposed(factor)
     inverse = np.where(kept, 1.0 / np.where(kept, values, 1.0), 0.0)
-    x = directions.T @ (inverse * (left.T @ right)) / scale
+    x = directions.T @ (inverse * (left.T @ factor[:-1, -1])) / scale
     half = directions.T * inverse / scale[:, None]
     blind = np.linalg.norm(directions[~kept], axis=0) if (~kept).any() else np.zeros(len(x))
     return Solution(x, half @ half.T, blind < 1e-6)
+
+
+def undecided(factor: Array, x: Array) -> Array:
+    """Covariance (p, p) of x along the directions N (p, b) that R does not show: 2 P diag(x²) P.
+
+    P = N Nᵀ, with columns scaled to unit norm. Two parameters of one column have half of their sum
+    each, and either may be all of it: ± as much as each has.
+    """
+    scale, _, _, directions, kept = _decomposed(factor)
+    blind = directions[~kept].T
+    half = blind @ (blind.T * (np.sqrt(2.0) * scale * x)) / scale[:, None]
+    return np.asarray(half @ half.T)
+
+
+def _decomposed(factor: Array) -> tuple[Array, Array, Array, Array, Mask]:
+    """Norms of C's columns, its singular values and vectors with these one, and which are seen."""
+    norms = np.linalg.norm(factor[:-1, :-1], axis=0)
+    scale = np.where(norms > 0, norms, 1.0)
+    left, values, directions = np.linalg.svd(factor[:-1, :-1] / scale)
+    kept = values > BLIND * max(float(values[0]) if len(values) else 0.0, 1e-300)
+    return scale, left, values, directions, kept
 
 
 def residual_squares(factors: Sequence[Array], x: Array) -> Array:

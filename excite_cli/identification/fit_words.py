@@ -1,12 +1,13 @@
 """A fit in words, the same ones wherever it is reported."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from enum import StrEnum
 from statistics import median
 
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit import Fit
+from excite_cli.measurement.dataset import Finding, Mask
 
 _STANDS_OUT = 1.5  # times the typical joint
 
@@ -24,6 +25,14 @@ def fixed_by_data(fit: Fit, i: int) -> Identifiable:
     if not fit.identifiable[i]:
         return Identifiable.NO
     return Identifiable.YES if fit.essential[i] else Identifiable.ZERO
+
+
+def not_seen(names: Sequence[str], seen: Mask) -> Iterator[Finding]:
+    """A note about parameters (p,) that the data do not show, if there are any."""
+    unseen = [name for name, ok in zip(names, seen, strict=True) if not ok]
+    if unseen:
+        text = f"{', '.join(unseen)}: do not show in these data, or only in sums with each other."
+        yield Finding("not_seen", "note", text)
 
 
 def relative_in_words(share: float) -> str:

@@ -18,6 +18,7 @@ from excite_cli.identification.declared_states import (
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.filter_bias import filter_findings, fitted_behind
 from excite_cli.identification.fit import Fit, effect_parameters, fit
+from excite_cli.identification.fit_words import not_seen
 from excite_cli.identification.hausman import (
     SIGNIFICANT,
     Hausman,
@@ -254,10 +255,7 @@ def _noticed(found: Fit, hausman: Hausman) -> list[Finding]:
             f"{len(loose)} of {len(found.names)} parameters are not identifiable from these data."
         )
         findings.append(Finding("not_identifiable", "note", text))
-    unseen = [name for name, std in zip(found.names, found.std, strict=True) if np.isinf(std)]
-    if unseen:
-        text = f"{', '.join(unseen)}: do not show in these data, or only in sums with each other."
-        findings.append(Finding("not_seen", "note", text))
+    findings += not_seen(found.names, np.isfinite(found.std))
     if found.consistent is not None and not found.consistent.solved:
         text = f"no physically consistent set was found: {found.consistent.status}."
         findings.append(Finding("inconsistent", "warning", text))

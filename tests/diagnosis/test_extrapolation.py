@@ -89,6 +89,24 @@ def test_a_spring_of_a_joint_that_crept_is_not_known() -> None:
     assert "the joint's range and speed" in sizes.why_not(stiff, [0], [0])
 
 
+def test_what_is_all_but_an_offset_in_the_data_is_not_known() -> None:
+    """A spring of 2 N·m/rad over a twentieth of a radian, 2 N·m of it constant."""
+    seen = crept(0.05)
+    seen = replace(seen, q=seen.q + 1.0)
+    names = ("spring", "viscous_friction", "coulomb_friction", "torque_offset", "armature")
+    effects = [kind(name) for name in names]
+    data, candidates = made(seen, effects, np.full((SAMPLES, ROBOT.n), TORQUE))
+    size = np.array([2.0, 0.0])
+    assert not Reach(candidates, data, usual(seen), always=[1]).why_not(0, size)
+    assert "beside friction and offset" in Reach(
+        candidates, data, usual(seen), always=[1, 2, 3, 4]
+    ).why_not(0, size)
+    # So it is where two of the columns are one, of a joint that never turned round.
+    forth = replace(seen, v=np.abs(seen.v) + SLOW)
+    data, candidates = made(forth, effects, np.full((SAMPLES, ROBOT.n), TORQUE))
+    assert Reach(candidates, data, usual(forth), always=[1, 2, 3, 4]).why_not(0, 2 * size)
+
+
 def test_what_was_seen_over_the_range_or_is_of_some_runs_may_be_any() -> None:
     some = replace(kind("viscous_friction"), runs=("",))
     for fastest, one, size in ((FAST, kind("spring"), [20.0, 0.0]), (SLOW, some, [1e6])):

@@ -112,6 +112,18 @@ def test_whether_another_joins_what_was_found(
     assert with_everyday(given, [0]) == ([0, 1] if joins else [0])
 
 
+def test_what_the_data_do_not_tell_from_what_was_found_is_shared_with_it() -> None:
+    """Of a joint that never turned round friction and offset are one number, as in a textbook."""
+    seen = crept(SLOW)
+    seen = replace(seen, v=np.abs(seen.v) + SLOW)
+    for names in (("coulomb_friction", "torque_offset"), ("torque_offset", "coulomb_friction")):
+        given = found_with(seen, [kind(each) for each in names], noisy(seen, 0.0, 0.1), 0.1)
+        assert with_everyday(given, [0]) == [0]  # the textbook's model does without
+        given = replace(given, plain=(0, 1))
+        assert with_everyday(given, [0]) == [0, 1]
+        assert given.fitted([0, 1]) == pytest.approx(np.full(2, TORQUE / 2), rel=0.02)
+
+
 def test_what_is_not_of_every_robot_is_left_alone_and_one_of_two_alike_leaves() -> None:
     seen = crept(FAST)
     spring = [kind("coulomb_friction"), kind("spring")]

@@ -51,6 +51,20 @@ def test_what_no_sample_shows_is_said_and_does_no_harm() -> None:
     assert np.isfinite(np.diag(fit.covariance)[fit.seen]).all()
 
 
+@pytest.mark.parametrize("method", ["wls", "irls"])
+def test_a_prior_that_data_contradict_is_not_noise(method: str) -> None:
+    """A parameter twenty deviations from its prior, in a residual of less than the noise at first.
+
+    Taken for noise, what the prior forbids would hide the data that contradict it.
+    """
+    rng, x = np.random.default_rng(0), np.array([2.0, -1.0])
+    columns = 0.01 * rng.normal(size=(20, 2, 2))
+    tau = columns @ x + 1e-5 * rng.normal(size=(20, 2))
+    prior = np.eye(2) / 0.1, np.zeros(2)
+    found = fit_rows([RunRows(columns, tau, np.ones(tau.shape, bool))], method, prior)
+    assert found.x == pytest.approx(x, rel=0.01)
+
+
 def test_a_prior_decides_where_data_are_silent_and_nowhere_else() -> None:
     rows = random_rows(1, np.array([0.1, 0.1]))
     columns = np.concatenate([rows.columns, np.zeros((*rows.tau.shape, 1))], axis=2)
