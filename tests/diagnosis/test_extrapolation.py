@@ -107,6 +107,17 @@ def test_what_is_all_but_an_offset_in_the_data_is_not_known() -> None:
     assert Reach(candidates, data, usual(forth), always=[1, 2, 3, 4]).why_not(0, 2 * size)
 
 
+def test_a_change_with_time_is_known_from_the_recordings_after_it_alone() -> None:
+    """The joint crept when the change had come; it is judged as it is in the last recording."""
+    late = replace(crept(SLOW), start=60.0)
+    change = kind("friction_change", time_constant=20.0, span=60.0)
+    effects = [change, kind("viscous_friction"), kind("coulomb_friction")]
+    for seen, known in ((late, False), (replace(crept(FAST), start=60.0), True)):
+        data, candidates = made(seen, effects, np.full((SAMPLES, ROBOT.n), TORQUE))
+        reach = Reach(candidates, data, usual(seen))
+        assert bool(reach.why_not(0, np.array([0.0, 5.0]))) is not known
+
+
 def test_what_was_seen_over_the_range_or_is_of_some_runs_may_be_any() -> None:
     some = replace(kind("viscous_friction"), runs=("",))
     for fastest, one, size in ((FAST, kind("spring"), [20.0, 0.0]), (SLOW, some, [1e6])):

@@ -62,6 +62,19 @@ def test_a_robot_with_one_moved_joint() -> None:
     assert dry_friction(found)[0] == pytest.approx(3.0, rel=0.1)
 
 
+def test_friction_of_a_joint_that_turned_one_way_is_an_offset_as_well() -> None:
+    def one_way(run: Run) -> Run:
+        return replace(run, valid=np.gradient(run.q, run.t, axis=0) > 0.02)
+
+    both = "effects=[{kind: coulomb_friction, joints: all}, {kind: torque_offset, joints: all}]"
+    given = case("robot.joints=[elbow]", both, "diagnosis.rounds=0")
+    data = each(recorded("elbow"), one_way)
+    for found in (identify(given, data), diagnose(given, data)):
+        (note,) = (each.text for each in found.findings if each.kind == "not_seen")
+        assert "coulomb_friction.coulomb[elbow]" in note
+        assert "torque_offset.offset[elbow]" in note
+
+
 def test_what_was_tested_and_not_found_is_kept_for_the_next_motion() -> None:
     own = case("robot.joints=[elbow]", "criterion.kind=predicted_torque")
     found = diagnose(own, recorded("elbow"))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from excite_cli.diagnosis import final_fit as final_fit_
 from excite_cli.diagnosis import sufficient as sufficient_
 from excite_cli.diagnosis.judgement import Judgement, Rules
 from excite_cli.diagnosis.noise_model import NoiseModel
@@ -112,8 +113,17 @@ def test_whether_another_joins_what_was_found(
     assert with_everyday(given, [0]) == ([0, 1] if joins else [0])
 
 
-def test_what_the_data_do_not_tell_from_what_was_found_is_shared_with_it() -> None:
-    """Of a joint that never turned round friction and offset are one number, as in a textbook."""
+def test_what_the_data_do_not_tell_from_what_was_found_is_shared_with_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of a joint that never turned round friction and offset are one number, as in a textbook.
+
+    Either may be all of it, whatever is imagined beside the data.
+    """
+    monkeypatch.setattr(final_fit_, "usual_sizes", lambda robot, base, effects: np.full(2, 10.0))
+    nothing: Any = SimpleNamespace(
+        robot=None, base=None, declared=(), known=np.zeros((0, 1)), prior=None, vague=True
+    )
     seen = crept(SLOW)
     seen = replace(seen, v=np.abs(seen.v) + SLOW)
     for names in (("coulomb_friction", "torque_offset"), ("torque_offset", "coulomb_friction")):
@@ -122,6 +132,10 @@ def test_what_the_data_do_not_tell_from_what_was_found_is_shared_with_it() -> No
         given = replace(given, plain=(0, 1))
         assert with_everyday(given, [0]) == [0, 1]
         assert given.fitted([0, 1]) == pytest.approx(np.full(2, TORQUE / 2), rel=0.02)
+        linear = final_fit_.regression(replace(given, chosen=(0, 1)), nothing)
+        assert np.sqrt(np.diag(linear.shown)) == pytest.approx(np.abs(linear.x), rel=0.01)
+        assert linear.shown.sum() < 1e-3  # the sum is known
+        assert not linear.seen.any()
 
 
 def test_what_is_not_of_every_robot_is_left_alone_and_one_of_two_alike_leaves() -> None:

@@ -2,7 +2,14 @@ import numpy as np
 import pytest
 
 from excite_cli.identification.covariance import RunRows
-from excite_cli.identification.factors import run_factors, solve, stacked, together
+from excite_cli.identification.factors import (
+    run_factors,
+    solve,
+    stacked,
+    together,
+    triangle_of,
+    undecided,
+)
 from excite_cli.identification.least_squares import fit_rows
 from excite_cli.robot.model import Array
 
@@ -49,6 +56,20 @@ def test_what_no_sample_shows_is_said_and_does_no_harm() -> None:
     assert fit.x[1:4] == pytest.approx(X[1:], rel=0.02)
     assert fit.x[0] - 3 * fit.x[4] == pytest.approx(X[0], rel=0.02)  # the torque is predicted
     assert np.isfinite(np.diag(fit.covariance)[fit.seen]).all()
+
+
+def test_what_is_not_decided_between_columns_may_be_all_in_either() -> None:
+    """Pairs of equal columns, of other scales, in one stack: each pair for itself."""
+    rng = np.random.default_rng(0)
+    one, other, alone = rng.normal(size=(3, 50))
+    columns = np.stack([one, -one, alone, 9 * other, other], axis=1)
+    x = np.array([2.0, -2.0, 1.0, 3.0, 27.0])
+    factor = triangle_of(np.column_stack([columns, columns @ x]))
+    assert solve(factor).x == pytest.approx(x)
+    expected = np.zeros((5, 5))
+    expected[:2, :2] = 4.0
+    expected[3:, 3:] = [[9.0, -81.0], [-81.0, 729.0]]
+    assert undecided(factor, x) == pytest.approx(expected, abs=1e-6)
 
 
 @pytest.mark.parametrize("method", ["wls", "irls"])
