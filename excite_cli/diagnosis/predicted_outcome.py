@@ -9,8 +9,8 @@ Nothing in k imitates the energy λ = zᵀ S_pp z [χ²] of its torque. It is na
 c its price, unless s = ν √(λ/N), a share of the torque's RMS, is below `rules.SMALLEST`: ν is the
 noise of a sample as such a share, N the number of samples. Of a robot whose inertias are off by the
 share u, s is large enough with the probability Φ(ln(s / SMALLEST) / u). Fitted in its place, k
-leaves of it the energy E_b in block b of the held-out recording. Drawn with replacement, blocks confirm it (2.5 % of the
-draws may say otherwise, `held_out_verdict.py`) with about the probability
+leaves of it the energy E_b in block b of the held-out recording. Drawn with replacement, blocks
+confirm it (2.5 % of the draws may say otherwise, `held_out_verdict.py`) with about the probability
 
     Φ(Σ E_b / √(Σ (E_b − Ē)² + 4 Σ E_b) − 1.96):
 
