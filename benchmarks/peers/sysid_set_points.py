@@ -25,7 +25,7 @@ from mujoco import sysid
 from excite_cli.api.loading import Case, dataset_of
 from excite_cli.api.model import Model, load_model
 from excite_cli.api.model_exports import for_simulators
-from excite_cli.api.replaying import set_points
+from excite_cli.api.played_runs import set_points
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.catalogue import urdf_friction
 from excite_cli.export.drive import Drive, drive_of

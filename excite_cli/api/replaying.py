@@ -10,6 +10,7 @@ from excite_cli.api.arguments import checked
 from excite_cli.api.loading import Case, dataset_of
 from excite_cli.api.model import Model, load_model
 from excite_cli.api.model_exports import for_simulators
+from excite_cli.api.played_runs import of_robot, set_points, simulated_model, torques
 from excite_cli.api.scoring import recordings_of
 from excite_cli.checks.all_checks import look, without_fault
 from excite_cli.errors import ConfigError, FileError, RobotError
@@ -20,13 +21,13 @@ from excite_cli.identification.identified_model import IdentifiedModel, as_descr
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.stored_model import StoredModel
 from excite_cli.measurement.dataset import Dataset, Run
-from excite_cli.robot.model import Array, Robot
+from excite_cli.robot.model import Robot
 from excite_cli.scoring.records import Replay, ReplayedModel, SetPointReplay
 from excite_cli.scoring.score import Scorer
 from excite_cli.shown.answer import Answer
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.simulation.replay import ReplayInput, drift, inertias
-from excite_cli.simulation.set_point_replay import HORIZONS, SetPointInput, set_point_errors
+from excite_cli.simulation.set_point_replay import HORIZONS, set_point_errors
 from excite_cli.summary.simulation import replay_answer as torque_answer
 from excite_cli.summary.simulation import set_point_answer
 
@@ -86,15 +87,15 @@ def replay(
             f"--beside: only where set points are played, and the torque of {stored.path} was "
             "measured. Replay the other model by itself."
         )
-    simple, notes = for_simulators(stored, "mjcf")
-    exported = mjcf(robot, simple)
+    exported = simulated_model(stored)
+    notes = exported.notes
     q = np.concatenate([run.q for run in runs])
     postures = robot.all_positions(q[:: max(1, len(q) // _POSTURES)])
     inertia = inertias(exported.text, postures)
     lost: list[str] = []
 
     def deviation(text: str, played: list[ReplayInput], name: str) -> dict[str, float]:
-        found = drift(text, [_of_all(robot, run) for run in played], inertia)
+        found = drift(text, played, inertia)
         if found.lost:
             lost.append(name)
         rms = dict(zip(robot.tree.joint_names, map(float, found.rms), strict=True))
@@ -105,11 +106,10 @@ def replay(
     if isinstance(untouched, str):
         notes = (*notes, untouched)
     elif untouched is not None:
-        as_measured = [_played(run, run.tau_raw) for run in runs]
+        as_measured = [torques(robot, run, run.tau_raw) for run in runs]
         before = deviation(untouched.text, as_measured, "the URDF")
-    after = deviation(
-        exported.text, [_played(run, _of_robot(given, run)) for run in runs], "the model"
-    )
+    of_model = [torques(robot, run, of_robot(given, run)) for run in runs]
+    after = deviation(exported.text, of_model, "the model")
     return Replay(
         str(stored.path),
         tuple(own),
@@ -118,7 +118,7 @@ def replay(
         after,
         tuple(lost),
         tuple(n for n, s in zip(robot.joint_names, robot.sliding, strict=True) if s),
-        (*notes, *exported.notes),
+        notes,
     )
 
 
@@ -136,27 +136,6 @@ def _urdf(robot: Robot) -> ModelText | str | None:
         return mjcf(robot, described)
     except RobotError as refused:
         return f"the URDF is not played: {refused}"
-
-
-def _played(run: PreparedRun, torque: Array) -> ReplayInput:
-    return ReplayInput(run.t, run.q, run.v, torque)
-
-
-def _of_all(robot: Robot, run: ReplayInput) -> ReplayInput:
-    """The run with the joints that follow others, which no motor drives."""
-    if robot.coupling is None:
-        return run
-    torque = np.zeros((len(run.t), robot.tree.n))
-    torque[:, np.array(robot.model_joints) - robot.first_joint] = run.torque
-    return ReplayInput(run.t, robot.all_positions(run.q), robot.all_rates(run.v), torque)
-
-
-def _of_robot(model: Model, run: PreparedRun) -> Array:
-    """The robot's torque (T, n): what was measured, less what the model holds for its defects."""
-    stored = model.made
-    defects = tuple(effect for effect in stored.model.effects if effect.data_defect)
-    whole = stored.model.predicted(stored.robot, run).torque
-    return run.tau_raw - (whole - stored.model.without(defects).predicted(stored.robot, run).torque)
 
 
 # Recorded set points played on exported models: the part of `excite replay` without torques.
@@ -234,38 +213,6 @@ def _texts(
     if beside is not None:
         other, _ = for_simulators(beside.made, "mjcf")
         texts[str(beside.made.path)] = mjcf(beside.made.robot, other, at_once).text
-    simple, more = for_simulators(stored, "mjcf")
-    exported: ModelText = mjcf(stored.robot, simple, at_once)
+    exported = simulated_model(stored)
     texts[str(stored.path)] = exported.text
-    return texts, (*notes, *more, *exported.notes)
-
-
-def set_points(robot: Robot, drive: Drive, run: Run, prepared: PreparedRun) -> SetPointInput:
-    """What the drives got during `prepared`, a part of `run`, in the units of an actuator.
-
-    Raises
-    ------
-    FileError
-        The log has no set points.
-    """
-    if "q_cmd" not in run.extra:
-        raise FileError(
-            f"run '{run.label}' has no set points (q_cmd), which the drives of this model follow. "
-            "Give the log with them (measurement.channels names its columns)."
-        )
-    ctrl = _held(run.extra["q_cmd"])
-    if "v_cmd" in run.extra:
-        ctrl = ctrl + drive.kd / drive.kp * _held(run.extra["v_cmd"])
-    if "tau_ff" in run.extra:
-        ctrl = ctrl + _held(run.extra["tau_ff"]) / drive.kp
-    q, v = prepared.q, prepared.v
-    if robot.coupling is not None:
-        q, v = robot.all_positions(q), robot.all_rates(v)
-    return SetPointInput(prepared.t, q, v, run.t, ctrl)
-
-
-def _held(values: Array) -> Array:
-    """(S, n), with the value before where one is missing."""
-    found = np.array(values, dtype=float)
-    newest = np.where(np.isfinite(found), np.arange(len(found))[:, None], 0)
-    return np.take_along_axis(found, np.maximum.accumulate(newest, axis=0), axis=0)
+    return texts, (*notes, *exported.notes)

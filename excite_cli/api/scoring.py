@@ -1,6 +1,7 @@
 """Stored models against new data: `excite score`."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -9,13 +10,15 @@ from excite_cli.api.arguments import checked, refuse_twice
 from excite_cli.api.loading import Case, dataset_of, load_data, tell_findings
 from excite_cli.api.model import Model, load_model
 from excite_cli.api.outputs import held
+from excite_cli.api.played_runs import SimulatedModel, drift_of, simulated_model
 from excite_cli.checks.all_checks import look
 from excite_cli.errors import ExciteError, FileError
 from excite_cli.identification.split import split, whole
+from excite_cli.identification.stored_model import StoredModel
 from excite_cli.identification.torque_trace import torque_units
 from excite_cli.measurement.arrange import OtherJointsError
 from excite_cli.measurement.dataset import Dataset, Finding, Run
-from excite_cli.scoring.records import Score, ScoredRun
+from excite_cli.scoring.records import HorizonDrift, Score, ScoredRun
 from excite_cli.scoring.score import Scorer, Shift, shift_of, together, with_shift
 from excite_cli.scoring.thresholds import Residual, Thresholds, thresholds_of
 from excite_cli.shown.note import Level, Note, Tell, log_note, unheard
@@ -63,12 +66,13 @@ def score(
     refuse_twice(paths)
     case = Case(stored.spec, stored.folder, stored.robot)
     at_hand = dataset_of(case, data, unheard) if isinstance(data, Dataset) else None
+    simulated = _simulated(stored)
     with held({"output": output}, overwrite, (stored.path, *paths)):
 
         def scored(worse: Shift | None, files: Sequence[Path]) -> list[_Scored | Exception]:
             if at_hand is not None:
-                return [_scored(given, at_hand, "", held_out, True, worse)]
-            shared = (str(stored.path), held_out, len(paths) == 1, worse)
+                return [_scored(given, at_hand, "", held_out, True, worse, simulated)]
+            shared = (str(stored.path), held_out, len(paths) == 1, worse, simulated)
 
             def watch(news: News) -> None:
                 progress(f"{news.done} of {news.total} files", news.done)
@@ -102,6 +106,7 @@ def score(
             stored.held_out_run,
             stored.noise or {},
             tuple(findings),
+            simulated if isinstance(simulated, str) else "",
         )
         found = replace(found, findings=(*found.findings, *_noticed(found, given, held_out)))
         for finding in found.findings[len(findings) :]:
@@ -112,16 +117,27 @@ def score(
 
 
 _Scored = tuple[list[ScoredRun], list[Finding]]
+_Simulated = SimulatedModel | str  # or why there is none
+
+
+def _simulated(stored: StoredModel) -> _Simulated:
+    if stored.robot.base_joints:
+        return "contacts hold its base, and these are not simulated."
+    try:
+        return simulated_model(stored)
+    except ExciteError as error:
+        return str(error)
 
 
 def score_file(
-    shared: tuple[str, bool, bool, Shift | None], path: str, tell: WorkersTell
+    shared: tuple[str, bool, bool, Shift | None, _Simulated], path: str, tell: WorkersTell
 ) -> _Scored:
     """Scores of the runs of one file, for workers.
 
-    `shared`: the model's file, held out, only one, and what was seen of its runs before.
+    `shared`: the model's file, held out, only one, what was seen of its runs before, and the model
+    for a simulator.
     """
-    model, held_out, single, worse = shared
+    model, held_out, single, worse, simulated = shared
     given = _known_model(model, Path(model).stat().st_mtime_ns)
     case = Case(given.made.spec, given.made.folder, given.made.robot)
     try:
@@ -131,7 +147,7 @@ def score_file(
             f"{error} If these names are right, the data are of another robot than "
             f"{given.made.robot.name}, which {model} is of: score them with a model of that one."
         ) from error
-    return _scored(given, data, path, held_out, single, worse)
+    return _scored(given, data, path, held_out, single, worse, simulated)
 
 
 @lru_cache(maxsize=1)
@@ -146,7 +162,8 @@ def _scored(
     path: str,
     held_out: bool,
     single: bool,
-    worse: Shift | None = None,
+    worse: Shift | None,
+    simulated: _Simulated,
 ) -> _Scored:
     stored = model.made
     scorer, runs, findings = Scorer(stored), [], list(data.findings)
@@ -154,7 +171,9 @@ def _scored(
     for name, parts in own.items():
         label = name if single else f"{Path(path).stem}: {name}"
         try:
-            runs.append(scorer.of(parts, path or ", ".join(data.sources), label, worse))
+            run = scorer.of(parts, path or ", ".join(data.sources), label, worse)
+            drift = () if isinstance(simulated, str) else _drift(model, simulated, scorer, parts)
+            runs.append(replace(run, drift=drift))
             if runs[-1].alarm:  # before what may have changed in the robot: is it set up as then?
                 wrong = look(stored.robot, parts, scorer.prepared(parts), stored.spec)
                 told = [replace(each.finding, severity="warning", run=label) for each in wrong
@@ -163,6 +182,17 @@ def _scored(
         except FileError as short:
             findings.append(Finding("not scored", "warning", str(short), name))
     return runs, findings
+
+
+def _drift(
+    model: Model, simulated: SimulatedModel, scorer: Scorer, parts: Sequence[Run]
+) -> tuple[HorizonDrift, ...]:
+    """Of the parts of a recording that are long enough for the filters."""
+    pairs = []
+    for run in parts:
+        with suppress(FileError):
+            pairs += [(run, each) for each in scorer.prepared([run])]
+    return drift_of(model, simulated, pairs)
 
 
 def _gathered(

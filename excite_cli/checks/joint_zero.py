@@ -9,7 +9,9 @@ from excite_cli.checks.setup_check import Alternative, Settings, SetupCheck, des
 from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
 from excite_cli.config.spec import Spec
 
-_COARSE = np.radians([15.0, 45.0, 90.0, 135.0, 180.0, -135.0, -90.0, -45.0, -15.0])
+# Of steps of 15° alone, one towards a zero that is less than 7.5° off explains less than none: an
+# elbow 6.6° off ranked behind joints that show no zero, and a wrist of parallel axis was moved.
+_COARSE = np.radians([5.0, 15.0, 45.0, 90.0, 135.0, 180.0, -135.0, -90.0, -45.0, -15.0, -5.0])
 _FINE = np.radians([22.5, 11.2, 5.6, 2.8, 1.4, 0.7, 0.35])  # half steps
 # Price, in L, of an angle that is no right one: a payload that is not in the URDF looks like 12°.
 _ODD = 1.0

@@ -6,14 +6,17 @@ Nothing in k imitates the energy λ = zᵀ S_pp z [χ²] of its torque. It is na
 
     Φ(√λ − √c) + Φ(−√λ − √c),
 
-c its price, unless ν √(λ/N), a share of the torque's RMS, is below `rules.SMALLEST`: ν is the noise
-of a sample as such a share, N the number of samples. Fitted in its place, k leaves of it the energy
-E_b in block b of the held-out recording. Drawn with replacement, blocks confirm it (2.5 % of the
-draws may say otherwise, `held_out_verdict.py`) with about the probability
+c its price, unless s = ν √(λ/N), a share of the torque's RMS, is below `rules.SMALLEST`: ν is the
+noise of a sample as such a share, N the number of samples. Of a robot whose inertias are off by the
+share u, s is large enough with the probability Φ(ln(s / SMALLEST) / u). Fitted in its place, k
+leaves of it the energy E_b in block b of the held-out recording. Drawn with replacement, blocks
+confirm it (2.5 % of the draws may say otherwise, `held_out_verdict.py`) with about the probability
 
     Φ(Σ E_b / √(Σ (E_b − Ē)² + 4 Σ E_b) − 1.96):
 
-what shows in a few blocks only is not confirmed, however large. Another effect d cannot imitate
+what shows in a few blocks only is not confirmed, however large. Rows of C are averages as those of
+a fit, which leaves out the instants about reversals, and those in which a joint hardly moves
+(`prepare.py`): Stribeck friction has most of its torque there. Another effect d cannot imitate
 
     E = zᵀ (S_pp − S_pd S_dd⁻¹ S_dp) z
 
@@ -35,7 +38,10 @@ from excite_cli.diagnosis.schur import ABSORBED
 from excite_cli.effects.base import Effect
 from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.prediction import Prediction
+from excite_cli.excitation.problem import Problem
+from excite_cli.identification.prepare import PreparedRun
 from excite_cli.robot.model import Array
+from excite_cli.trajectory.fade import Segment
 
 _CONFIRMED = norm.ppf(0.975)
 _DOUBT = 4.0  # χ² of two standard deviations
@@ -63,12 +69,13 @@ def predict_outcome(
     effect: Effect,
     values: Array,
     noise: float,
+    unsure: float = 0.0,
 ) -> PredictedOutcome:
     """For `effect` with its parameters `values` in their units.
 
     `blocks` (B, m, c): rows of the held-out recording, cut into blocks; None where others are sure
-    to be confirmed with it. `noise`: ν of the module, that of all rows. What is none of the
-    prediction's effects shows on no motion.
+    to be confirmed with it. `noise`, `unsure`: ν and u of the module, those of all rows. What is
+    none of the prediction's effects shows on no motion.
     """
     if effect not in prediction.extension.effects:
         return PredictedOutcome(0.0)
@@ -96,10 +103,11 @@ def predict_outcome(
     energy, cost = float(z @ left[np.ix_(p, p)] @ z), price(type(effect), significance)
     samples = max(1.0, stack.rows / len(prediction.usual))
     share = noise * np.sqrt(max(energy, 0.0) / samples)
-    if not share >= rules.SMALLEST:
+    if not share >= rules.SMALLEST * np.exp(-_DOUBT * unsure):
         return PredictedOutcome(0.0)
+    large = float(norm.cdf(np.log(share / rules.SMALLEST) / unsure)) if unsure else 1.0
     always = effect.kind in TEXTBOOK and share >= rules.MATTERS
-    named = probability_named(float(np.sqrt(energy)), _DOUBT if always else cost)
+    named = large * probability_named(float(np.sqrt(energy)), _DOUBT if always else cost)
     if blocks is not None:
         missed = np.square(blocks @ residual[:, p] @ z).sum(axis=1)
         spread = np.sqrt(np.square(missed - missed.mean()).sum() + 4.0 * missed.sum())
@@ -118,6 +126,20 @@ def predict_outcome(
     return PredictedOutcome(
         named, apart, False, (effects[at].kind, tuple(names[j] for j in effects[at].joints))
     )
+
+
+def rows_of_fit(problem: Problem, motion: Segment, run: PreparedRun) -> Array:
+    """Rows (M·R, c) of a motion as the fit of its recording `run` averages them.
+
+    In units of the noise of a mean over `run.step`; zero where the fit has none.
+    """
+    states, robot = motion.trajectory.states(run.t, motion.coefficients), problem.robot
+    block = problem.objective().block_of(run.t, *states).reshape(len(run.t), len(robot.rows), -1)
+    seconds = problem.spec.task.rate * problem.trajectory.duration
+    block *= np.sqrt(len(problem.cost_basis.times) / seconds)
+    rows = [run.fit_averages[j] @ block[:, k] for k, j in enumerate(robot.rows)]
+    usable = run.usable[:, list(robot.rows)].T[..., None]
+    return np.where(usable, rows, 0.0).transpose(1, 0, 2).reshape(-1, block.shape[-1])
 
 
 def _left(gram: Array, beside: Array, rank: int) -> tuple[Array, Array]:

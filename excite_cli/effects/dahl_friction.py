@@ -84,6 +84,7 @@ class DahlFriction(Effect):
     defaults: ClassVar = {"distance": 0.03, "damping": 0.0}
     prior_cost: ClassVar = 2.0
     refines: ClassVar = ("coulomb_friction",)
+    takes_from: ClassVar = ("coulomb_friction",)
 
     @property
     def shape_cost(self) -> float:

@@ -26,6 +26,7 @@ class Mechanism:
 
     defaults: ClassVar[Mapping[str, float]] = {}  # of `planted`, for what is not named
     data_defect: ClassVar[bool] = False  # lies in the measurement, not in the robot
+    takes_from: ClassVar[tuple[str, ...]] = ()  # kinds of its joint that it stands for a part of
     # The number that people know it by, if that is not the first linear parameter; and settings of
     # its mechanism that nobody identifies.
     known_by: ClassVar[str] = ""

@@ -1,5 +1,6 @@
 """What a score holds, as frozen records."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 
@@ -100,6 +101,27 @@ class RunExplanation:
     share: float
 
 
+@dataclass(frozen=True)
+class HorizonDrift:
+    """How far a simulation is from the robot `horizon` [s] after a start from a measured state.
+
+    Deviations [rad] (m) by joint: the `median` and the `worst` of `starts`, and the medians of a
+    robot that stands `still` and of one that keeps its speed (`steady`).
+    """
+
+    horizon: float
+    starts: int
+    median: dict[str, float]
+    worst: dict[str, float]
+    still: dict[str, float]
+    steady: dict[str, float]
+
+    @property
+    def beyond(self) -> tuple[str, ...]:
+        """Joints that drift farther than they move."""
+        return tuple(joint for joint, x in self.median.items() if x >= self.still[joint])
+
+
 @dataclass(frozen=True, repr=False)
 class ScoredRun(Shown):
     """A run, or a part of it, beside the torque that the model predicts; nothing was fitted.
@@ -110,7 +132,7 @@ class ScoredRun(Shown):
     the model does not say. `alarm` where joints (`left`) are beyond that; `reasons` are what
     explains it best. `sums` (6, n): ‖e‖², ‖τ‖², the same where joints move, and both counts of
     samples. `covariates`: means of the log's declared columns. `epoch` of the recording's
-    start [s], if known.
+    start [s], if known. `drift` of a simulation, for each horizon that the run is long enough for.
     """
 
     name: str
@@ -125,6 +147,7 @@ class ScoredRun(Shown):
     reasons: tuple[RunExplanation, ...] = ()
     covariates: dict[str, float] = field(default_factory=dict)
     epoch: float | None = None
+    drift: tuple[HorizonDrift, ...] = ()
 
     @property
     def alarm(self) -> bool:
@@ -139,7 +162,10 @@ class ScoredRun(Shown):
 
 @dataclass(frozen=True, repr=False)
 class Score(Shown):
-    """Runs beside a stored model. `error` of all runs together, `made` that when it was made."""
+    """Runs beside a stored model. `error` of all runs together, `made` that when it was made.
+
+    `not_simulated`: why no run has a drift.
+    """
 
     model: str
     what: str
@@ -151,8 +177,38 @@ class Score(Shown):
     held_out_run: str = ""
     noise: dict[str, float] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
+    not_simulated: str = ""
+
+    @property
+    def drift(self) -> tuple[HorizonDrift, ...]:
+        """Of all runs: means, weighted by their starts, and the worst."""
+        every = [each for run in self.runs for each in run.drift]
+        return tuple(
+            _together([each for each in every if each.horizon == horizon])
+            for horizon in sorted({each.horizon for each in every})
+        )
 
     @property
     def alarms(self) -> tuple[ScoredRun, ...]:
         """Runs that leave what the model's own residual allows."""
         return tuple(run for run in self.runs if run.alarm)
+
+
+def _together(drifts: Sequence[HorizonDrift]) -> HorizonDrift:
+    """Of one horizon."""
+    starts = sum(each.starts for each in drifts)
+
+    def mean(of: Callable[[HorizonDrift], dict[str, float]]) -> dict[str, float]:
+        return {
+            joint: sum(each.starts * of(each)[joint] for each in drifts) / starts
+            for joint in of(drifts[0])
+        }
+
+    return HorizonDrift(
+        drifts[0].horizon,
+        starts,
+        mean(lambda each: each.median),
+        {joint: max(each.worst[joint] for each in drifts) for joint in drifts[0].worst},
+        mean(lambda each: each.still),
+        mean(lambda each: each.steady),
+    )

@@ -16,6 +16,7 @@ judge; what a stiffer controller would leave is smaller, in about the same propo
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -38,6 +39,13 @@ class ReplayInput:
     q: Array
     v: Array
     torque: Array
+    channel: ClassVar = "mjSTATE_QFRC_APPLIED"
+
+    def acting(self, times: Array, step: float) -> Array:
+        """Torques (K, n) in the middle of physics steps that begin at `times` (K,); 0: unknown."""
+        played = np.where(np.isfinite(self.torque), self.torque, 0.0)
+        middle = times + 0.5 * step
+        return np.column_stack([np.interp(middle, self.t, column) for column in played.T])
 
 
 @dataclass(frozen=True)

@@ -112,10 +112,14 @@ def usual_effects(robot: Robot, declared: Sequence[Effect], seed: int) -> list[P
 
 
 def beside(planted: PlantedEffect, robot: Robot, declared: Sequence[Effect]) -> list[PlantedEffect]:
-    """Effects of the same joints that it refines, as far as they are not `declared`."""
+    """Effects of the same joints that it refines, as far as they are not `declared`.
+
+    What it takes from comes beside what is declared: that may be less than it takes.
+    """
     kinds = [catalogue()[name] for name in planted.effect.refines]
     found = [plant(kind, planted.effect.joints, 0.0).effect for kind in kinds]
-    return _planted(found, robot, declared, _BESIDE)
+    there = [each for each in declared if each.kind not in planted.effect.takes_from]
+    return _planted(found, robot, there, _BESIDE)
 
 
 def _planted(

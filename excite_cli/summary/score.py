@@ -13,7 +13,17 @@ from excite_cli.report.plot import Curve, Panel, Plot
 from excite_cli.scoring.records import RunExplanation, Score, ScoredRun
 from excite_cli.scoring.score import NOT_THIS_ROBOT
 from excite_cli.scoring.thresholds import Thresholds
-from excite_cli.shown.answer import Answer, Charts, KeyFigure, Parts, Section, Table, parts_of, show
+from excite_cli.shown.answer import (
+    Answer,
+    Block,
+    Charts,
+    KeyFigure,
+    Parts,
+    Section,
+    Table,
+    parts_of,
+    show,
+)
 from excite_cli.summary.cells import figure, findings_data, percent
 
 # Thresholds of a collision detector in words and as a table.
@@ -58,6 +68,7 @@ def score_sections(found: Score) -> list[Section]:
         Section("ratios", "Residual over the runs", tuple(ratios)),
         Section("runs", "Runs", (runs_table(found),)),
         Section("joints", "Joints", (joints_table(found),)),
+        Section("drift", "Drift of a simulation", _drift_blocks(found)),
     ]
     return [section for section in every if section.blocks]
 
@@ -213,6 +224,41 @@ def joints_table(found: Score) -> Table:
     return Table.of(title, rows, left=("joint", "unit", "worst run"))
 
 
+def _drift_blocks(found: Score) -> tuple[Block, ...]:
+    """A table of horizons, or why there is none."""
+    if not found.drift:
+        why = found.not_simulated and f"No drift of a simulation: {found.not_simulated}"
+        return (why,) if why else ()
+    rows = []
+    for each in found.drift:
+        joint = max(each.worst, key=each.worst.__getitem__)
+        rows.append({
+            "after": f"{each.horizon:g} s",
+            "starts": str(each.starts),
+            "drift": _milli(each.median),
+            "stands still": _milli(each.still),
+            "keeps speed": _milli(each.steady),
+            "worst": f"{1e3 * each.worst[joint]:.3g}",
+            "on": joint,
+            "drift farther than they move": ", ".join(each.beyond) or "none",
+        })  # fmt: skip
+    sliding = [unit == "N" for unit in found.units]
+    unit = "mm" if all(sliding) else "mrad (mm)" if any(sliding) else "mrad"
+    table = Table.of(
+        f"Drift of a simulation from the robot, driven by what was recorded [{unit}]",
+        rows,
+        left=("on",),
+        words=("drift farther than they move",),
+        note="drift: median over starts from measured states, mean over joints; stands still, "
+        "keeps speed: the same of a guess without a model, that the robot does so.",
+    )
+    return (table,)
+
+
+def _milli(of: dict[str, float]) -> str:
+    return f"{1e3 * sum(of.values()) / len(of):.3g}"
+
+
 def _ratio(run: ScoredRun, joint: str) -> float:
     ratio = run.ratio.get(joint, 0.0)
     return ratio if isfinite(ratio) else 0.0
@@ -223,7 +269,7 @@ def score_data(found: Score) -> dict[str, Any]:
     return {
         "good": not found.alarms,
         "answer": sentences(found),
-        **data_of(found, "model", "error", "made", "noise"),
+        **data_of(found, "model", "error", "made", "noise", "drift", "not_simulated"),
         "findings": findings_data(found.findings),
         "runs": [_run_data(run, found) for run in found.runs],
     }
@@ -232,7 +278,7 @@ def score_data(found: Score) -> dict[str, Any]:
 def _run_data(run: ScoredRun, found: Score) -> dict[str, Any]:
     own = ("name", "file", "seconds", "allowed", "ratio", "peak", "alarm", "judged", "covariates")
     return {
-        **data_of(run, *own, "epoch"),
+        **data_of(run, *own, "epoch", "drift"),
         **data_of(run.error, "relative_moving", "relative", "rms", "samples"),
         "joints": list(run.left),
         "reasons": [

@@ -3,8 +3,10 @@
 from math import isnan, nan
 
 from excite_cli.fields import data_of
+from excite_cli.report.outcome_chart import outcome_chart
 from excite_cli.shown.answer import (
     Answer,
+    Charts,
     KeyFigure,
     Page,
     Parts,
@@ -51,12 +53,16 @@ def selftest_page(found: Selftest) -> Page:
     """The answer with all its tables, for a browser."""
     figures = [KeyFigure(str(each), str(found.count(each))) for each in Outcome]
     sections = (
-        Section("outcomes", "Outcomes", (_overview(found), _LEGEND)),
+        Section("outcomes", "Outcomes", (*_chart(found), _overview(found), _LEGEND)),
         Section("predicted", "Predicted and seen", (*_failures(found), _cases(found), _COLUMNS)),
         Section("sizes", "Sizes and errors", (_details(found), _MORE)),
     )
     title, answer = f"Self-test of {found.robot}", Text(_in_words(found), "answer")
     return Page(title, "Planted effects and their diagnoses", tuple(figures), sections, (answer,))
+
+
+def _chart(found: Selftest) -> tuple[Charts, ...]:
+    return (Charts((outcome_chart(found),)),) if found.cases else ()
 
 
 def _parts(found: Selftest) -> Parts:

@@ -19,7 +19,8 @@ from excite_cli import (
     replay,
     simulate,
 )
-from excite_cli.api.replaying import _held, replay_answer, set_points
+from excite_cli.api.played_runs import _held, set_points
+from excite_cli.api.replaying import replay_answer
 from excite_cli.api.simulating import PositionDrive
 from excite_cli.config.data_spec import DriveLawSpec
 from excite_cli.export.drive import Drive

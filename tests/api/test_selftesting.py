@@ -86,7 +86,7 @@ def test_the_noise_of_means_is_that_of_drawn_means(correlation: float, rate: flo
     size = round(rate / 20.0)
     drawn = _noise((200_000, 1), correlation, np.random.default_rng(1))
     means = drawn[: len(drawn) // size * size].reshape(-1, size).mean(axis=1)
-    assert outcome_prediction._noise_of_means(settings) == pytest.approx(
+    assert outcome_prediction._noise_of_means(settings, 20.0) == pytest.approx(
         0.05 * means.std(), rel=0.03
     )
 

@@ -108,7 +108,7 @@ def test_a_robot_that_hangs_elsewhere_in_its_config(
         assert told == pytest.approx(np.abs(turn), abs=5e-3)
 
 
-@pytest.mark.parametrize("by", [np.pi / 2, np.pi, 0.7])
+@pytest.mark.parametrize("by", [np.pi / 2, np.pi, 0.7, -0.115])
 def test_the_zero_of_a_joint(sound: Dataset, by: float) -> None:
     shifted = changed(sound, off(by))
     (result,) = found(shifted)

@@ -3,13 +3,18 @@
 import numpy as np
 import pytest
 
+from excite_cli.config.data_spec import FilterSpec
 from excite_cli.diagnosis import rules
 from excite_cli.diagnosis.power import power_of, price, sizes_shown
-from excite_cli.diagnosis.predicted_outcome import predict_outcome
+from excite_cli.diagnosis.predicted_outcome import predict_outcome, rows_of_fit
 from excite_cli.effects.base import Effect
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem
+from excite_cli.identification.prepare import prepare
+from excite_cli.identification.processing import choose_processing
+from excite_cli.measurement.dataset import Run
+from excite_cli.trajectory.fade import Segment
 from tests.excitation.smoke import drawn, smoke, stacked
 from tests.excitation.smoke import prediction_of as of
 
@@ -128,6 +133,45 @@ def test_what_shows_in_few_held_out_blocks_is_not_confirmed(problem: Problem) ->
     assert of_whole > 0.95
     assert of_few < 0.6
     assert of_none < 0.05
+
+
+def test_a_fit_leaves_out_what_shows_about_reversals_alone(problem: Problem) -> None:
+    """Dry friction is whole where a fit has rows; of Stribeck friction little is left there."""
+    motion = Segment("motion_1", problem.trajectory, drawn(problem, 0.3, 1))
+    t = np.arange(0.0, problem.trajectory.duration, 0.002)
+    q = motion.trajectory.states(t, motion.coefficients)[0]
+    recording = Run("motion_1", t, q, np.zeros_like(q))
+    run = prepare(recording, choose_processing([recording], FilterSpec()))
+    rows = rows_of_fit(problem, motion, run).reshape(len(run.tau_fit), problem.robot.n, -1)
+    prediction = of(problem)
+    joint = problem.robot.joint_names.index("elbow")
+
+    def torque(kind: str) -> np.ndarray:
+        """Of one unit of it."""
+        at = prediction.extension.effects.index(effect_of(problem, kind, "elbow"))
+        first = prediction.first_columns[at]
+        size = prediction.extension.scales[first - prediction.rank]
+        return np.abs(rows[:, joint, first]) / size
+
+    dry, narrow = torque("coulomb_friction"), torque("stribeck_friction")
+    assert 0.0 < narrow.max() < 0.12 * dry.max(), "0.16 with the instants about reversals"
+
+
+def test_a_share_near_the_smallest_is_named_as_often_as_inertias_let_it(problem: Problem) -> None:
+    stack, effect = stacked(problem, 1), effect_of(problem, "load_dependent_friction", "elbow")
+
+    def named(noise: float, unsure: float) -> float:
+        values = np.array([0.02])
+        return predict_outcome(of(problem), stack, None, 0.01, effect, values, noise, unsure).named
+
+    low, high = 1e-6, 1.0
+    for _ in range(40):
+        middle = np.sqrt(low * high)
+        low, high = (low, middle) if named(middle, 0.0) > 0.0 else (middle, high)
+    sure = named(1.1 * high, 0.0)
+    assert named(high, 0.2) == pytest.approx(0.5 * sure, abs=0.01)
+    assert named(high * np.exp(0.2), 0.2) == pytest.approx(0.841 * sure, abs=0.01)
+    assert named(high * np.exp(-1.0), 0.2) == 0.0
 
 
 def test_what_the_textbook_has_is_confirmed_from_two_deviations_on(problem: Problem) -> None:

@@ -120,6 +120,14 @@ def test_what_an_effect_refines_comes_with_it(robot: Robot) -> None:
     assert beside(planted, robot, [each.effect for each in more]) == []
 
 
+def test_what_an_effect_takes_from_comes_beside_what_is_declared(robot: Robot) -> None:
+    """Of the declared friction there may be less than the bristle takes."""
+    (planted,) = parse_planted("dahl_friction@elbow=1", robot, {})
+    declared = [each.effect for each in beside(planted, robot, ())]
+    assert [each.kind for each in declared] == ["coulomb_friction"]
+    assert [each.effect for each in beside(planted, robot, declared)] == declared
+
+
 def test_a_case_that_failed_is_bad() -> None:
     case = SelftestCase("armature@elbow=1", "armature", ("elbow",), 1.0, message="no way")
     assert not Selftest("arm", ("elbow",), (case,), 1).good

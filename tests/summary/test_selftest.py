@@ -54,5 +54,6 @@ def test_a_page_has_every_table() -> None:
         "-11.11 ± 0.01234",
         LONG.rival,
         "no way",
+        "Planted effects that are found: armature 0 of 1",
     ):
         assert words in page
