@@ -63,8 +63,9 @@
     ctx.beginPath();
     ctx.rect(left, top, bbox.width, bbox.height);
     ctx.clip();
-    ctx.fillStyle = colour("forbidden");
+    ctx.fillStyle = colour("shaded");
     for (const [from, to] of told.shaded) ctx.fillRect(at(from, "x"), top, at(to, "x") - at(from, "x"), bbox.height);
+    ctx.fillStyle = colour("forbidden");
     const [low, high] = panel.limits;
     if (low !== null) ctx.fillRect(left, at(low, "y"), bbox.width, bottom - at(low, "y"));
     if (high !== null) ctx.fillRect(left, top, bbox.width, at(high, "y") - top);
