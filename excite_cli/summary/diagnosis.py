@@ -21,7 +21,7 @@ from excite_cli.diagnosis.words import (
     value_in_words,
 )
 from excite_cli.fields import data_of, public_data
-from excite_cli.report.residual_chart import dependence_plots, residuals_in_time
+from excite_cli.report.residual_chart import IN_TIME, dependence_plots, residuals_in_time
 from excite_cli.report.validity_chart import validity_section
 from excite_cli.shown.answer import (
     Answer,
@@ -137,12 +137,21 @@ def _time_section(found: Diagnosis, detail: Detail) -> Section:
     blocks: tuple[Block, ...] = ()
     if detail == Detail.PAGE and found.traces is not None:
         traces = (*found.held_out_traces, *found.traces.runs)
-        blocks = residuals_in_time(traces, found.joint_names, found.torque_units)
+        noise = noise_by_joint(found)
+        blocks = residuals_in_time(traces, found.joint_names, found.torque_units, noise)
     lead = (
-        "Filtered torque, as used in the fit. Above: measured torque and prediction of the model "
-        "with all effects; below: residuals of this and of the declared model. Shaded: held out."
+        f"{IN_TIME} of the model with all effects and of the declared one, over the noise. Shaded: "
+        "held out."
     )
     return Section("diagnosis-time", "Residual in time", blocks, lead)
+
+
+def noise_by_joint(found: Diagnosis) -> dict[str, float]:
+    """Of the filtered torque [N·m] (N): of repeated periods, else what the model leaves as such."""
+    levels = found.processing.get("noise_rms")
+    if found.noise_floor is not None or not isinstance(levels, list):
+        return found.noise_floor or {}
+    return dict(zip(found.joint_names, map(float, levels), strict=False))
 
 
 def _validity_section(found: Diagnosis, detail: Detail) -> Section:

@@ -22,7 +22,7 @@ from excite_cli.identification.identify import Identification
 from excite_cli.identification.link_changes import LinkChange
 from excite_cli.identification.stored_model import StoredFit
 from excite_cli.report.error_chart import NOTHING_MOVES, error_charts, parameter_charts
-from excite_cli.report.residual_chart import residuals_in_time
+from excite_cli.report.residual_chart import IN_TIME, residuals_in_time
 from excite_cli.report.validity_chart import validity_section
 from excite_cli.shown.answer import (
     Answer,
@@ -275,6 +275,7 @@ def fit_sections(stored: StoredFit) -> list[Section]:
     fit, units = stored.fit, stored.torque_units
     # What took no part comes first: it is the judge.
     traces = sorted(stored.traces, key=lambda trace: not trace.held_out)
+    noise = stored.noise_floor or dict(zip(fit.joint_names, map(float, fit.noise), strict=True))
     return [
         Section(
             "fit-errors",
@@ -286,9 +287,8 @@ def fit_sections(stored: StoredFit) -> list[Section]:
         Section(
             "fit-time",
             "Fit in time",
-            residuals_in_time(traces, fit.joint_names, units),
-            "Filtered torque, as used in the fit. Above: measured torque and prediction of the "
-            "model; below: residual. Shaded: held out from the fit.",
+            residuals_in_time(traces, fit.joint_names, units, noise),
+            f"{IN_TIME}, over the noise. Shaded: held out from the fit.",
         ),
         *_validity(stored),
         Section(
