@@ -22,6 +22,7 @@ from excite_cli.shown.answer import (
     Section,
     Table,
     Text,
+    Verdict,
 )
 from excite_cli.summary.motions import margin_table, motion_table, pairs_of_numbers_table
 from excite_cli.summary.pairs import (
@@ -77,7 +78,7 @@ def result_figures(result: Result, problem: Problem) -> list[KeyFigure]:
     prior = ", on earlier data" if result.priors else ""
     for_work = result.motions[-1].predicted_deviation is not None
     name = "predicted torques, in noise of a sample" if for_work else "condition number"
-    found = [KeyFigure(name, in_figures(last), f"after {count}{prior}")]
+    found = [KeyFigure(name, in_figures(last), f"after {count}{prior}", anchor="condition")]
     if result.random:
         random = _figure(result.random[-1])
         worse = f"{in_figures(random / last)} times worse"
@@ -85,10 +86,19 @@ def result_figures(result: Result, problem: Problem) -> list[KeyFigure]:
     seconds = in_figures(sum(motion.seconds for motion in result.motions))
     duration = in_figures(problem.trajectory.duration)
     motions = f"{len(result.motions)} × {duration} s"
-    found.append(KeyFigure("motions", motions, f"found in {seconds} s"))
-    (value, remark), _ = _kept(result)
-    kept = [KeyFigure("constraints", value, remark)] if problem.constraints else []
-    return [*found, *kept]
+    found.append(KeyFigure("motions", motions, f"found in {seconds} s", anchor="motions"))
+    (value, remark), words = _kept(result)
+    verdicts: dict[str, Verdict] = {"good": "good", "bad": "bad"}
+    verdict = verdicts.get(words.kind, "open")
+    kept = KeyFigure("constraints", value, remark, verdict, "margins")
+    return [*found, *([kept] if problem.constraints else [])]
+
+
+def result_answer(result: Result) -> Text:
+    """What the page of motions says first."""
+    words = _kept(result)[1]
+    kind = "bad" if words.kind == "bad" else "answer"
+    return Text(f"{condition_words(result)} {words.text}", kind)
 
 
 def _figure(motion: Motion | RandomMotion) -> float:

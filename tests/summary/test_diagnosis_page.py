@@ -38,10 +38,10 @@ from excite_cli.shown.answer import (
 )
 from excite_cli.summary.assembly import Source, page_of
 from excite_cli.summary.diagnosis import (
-    diagnosis_figures,
     diagnosis_parts,
     diagnosis_sections,
 )
+from excite_cli.summary.status import diagnosis_figures
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis, make_traces
 from tests.report.structure import Structure
 
@@ -268,9 +268,10 @@ def test_the_page_has_every_table_and_sentence_of_the_terminal(diagnosis: Diagno
 def test_warnings_are_counted_on_top(diagnosis: Diagnosis) -> None:
     said = [Finding("lag", "warning", "late"), Finding("jitter", "note", "a bit")]
     warned = diagnosis_figures(replace(diagnosis, findings=tuple(said)))[-1]
-    assert (warned.value, warned.remark) == ("1 warning", "lag: see Data and choices")
+    assert "1 warning about the data (lag): see Data and choices" in warned.remark
+    assert warned.verdict == "open"
     calm = diagnosis_figures(replace(diagnosis, findings=()))[-1]
-    assert (calm.value, calm.remark) == ("0 warnings", "taken as recorded")
+    assert "0 warnings about the data: taken as recorded" in calm.remark
 
 
 def test_every_run_is_listed_with_its_use_and_what_is_there_alone(diagnosis: Diagnosis) -> None:

@@ -40,8 +40,9 @@
     return groups.get(link);
   };
   const DASHES = { dashed: [5, 3], dotted: [2, 2] };
-  const FONT = '12px system-ui, "Segoe UI", Roboto, "Helvetica Neue", "DejaVu Sans", sans-serif';
+  const FONT = 'system-ui, "Segoe UI", Roboto, "Helvetica Neue", "DejaVu Sans", sans-serif';
   let paper = false;
+  const font = (size) => (paper ? 0.75 * size : size) + "px " + FONT;
 
   // The sample of a series that is nearest to the cursor and known.
   const nearest = (plot, series, index) => {
@@ -112,7 +113,7 @@
     if (!text) return;
     const { ctx, bbox } = plot, size = devicePixelRatio, right = bbox.left + bbox.width - 4 * size;
     ctx.save();
-    ctx.font = FONT.replace("12px", 11.5 * size + "px");
+    ctx.font = font(11.5 * size);
     ctx.textAlign = "right";
     ctx.textBaseline = "top";
     const wide = ctx.measureText(text).width;
@@ -155,21 +156,21 @@
     holder.plots = told.panels.map((panel, number) => {
       const last = number === told.panels.length - 1;
       const { data, ends } = holder.numbers[number];
-      const axis = { stroke: () => colour("ink"), grid: { stroke: () => colour("grid"), width: 1 }, ticks: { stroke: () => colour("grid"), width: 1, size: 5 }, font: FONT, labelFont: FONT, values: ticks };
+      const axis = { stroke: () => colour("ink"), grid: { stroke: () => colour("grid"), width: 1 }, ticks: { stroke: () => colour("grid"), width: 1, size: 5 }, font: font(12), labelFont: font(12), values: ticks };
       const shown = () => told.span || [data[0][0], data[0][data[0].length - 1]];
       let telling = false;
       const plot = new uPlot({
         width: holder.clientWidth,
         class: last ? "lowest" : "upper",
         title: panel.axis,
-        height: panel.height + (last ? 34 : 0),
+        height: (paper ? 0.7 : 1) * panel.height + (last ? 34 : 0),
         padding: [8, 8, 0, 0],
         cursor: { sync: { key, setSeries: false, scales: ["x", null], filters: { pub: (type) => type === "mousemove" || type === "mouseleave" } }, drag: { x: true, y: false, setScale: true }, dataIdx: nearest, points: { size: 6 } },
         legend: { live: true, markers: { width: 2 } },
         scales: { x: { time: false, range: (_, low, high) => low === null ? shown() : [low, high] }, y: panel.span ? { range: panel.span } : panel.logarithmic ? { distr: 3, range: (_, low, high) => low === null ? [1, 10] : [low * 0.85, high * 1.18] } : {} },
         axes: [
           last ? { ...axis, label: told.axis, labelSize: 20, size: 32, gap: 2, space: told.counted ? 30 : 44, ...(told.counted ? { incrs: WHOLE } : {}) } : { ...axis, show: true, size: 4, values: () => [], space: 60 },
-          { ...axis, size: 46, gap: 3, space: 34, ...(panel.logarithmic ? { splits: decades, filter: (_, splits) => splits } : {}) },
+          { ...axis, size: paper ? 34 : 46, gap: 3, space: 34, ...(panel.logarithmic ? { splits: decades, filter: (_, splits) => splits } : {}) },
         ],
         series: [{ label: told.axis.replace(/\s*\[.*$/, ""), value: (_, value) => figures(value) }, ...panel.series.map(seriesOf)],
         hooks: {
@@ -248,7 +249,7 @@
     paper = true;
     for (const holder of holders) {
       remove(holder);
-      Object.defineProperty(holder, "clientWidth", { value: holder.closest(".wide") ? 660 : 320, configurable: true });
+      Object.defineProperty(holder, "clientWidth", { value: holder.closest(".wide") ? 680 : 218, configurable: true });
       build(holder);
     }
   };
