@@ -14,11 +14,11 @@ import numpy as np
 from excite_cli.report.chart import Colour
 from excite_cli.robot.model import Array
 
-Look = Literal["line", "band", "dashed", "dotted", "joined", "dots", "marks", "rings"]
+Look = Literal["line", "band", "dashed", "dotted", "joined", "steps", "dots", "marks", "rings"]
 
 _STEPS = 65533  # of two bytes; two values are kept
 _GAP, _ABSENT = -32768, 32767
-_HEAD, _AXIS = 38, 34  # px
+_LINE, _AXIS = 20, 34  # px, of text above a panel
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,8 @@ class Curve:
     """One quantity over the chart's x: `y` (T,), NaN where a line is to be broken.
 
     Infinite where it has no point of its own: a line goes on there. `low`, `high` (T,): ends of a
-    whisker at each point. `joined` is a line with its points, `band` a broad pale one.
+    whisker at each point. `joined` is a line with its points, `steps` keeps each value to
+    the next, `band` is broad and pale.
     """
 
     label: str
@@ -80,7 +81,8 @@ class Plot:
     @property
     def room(self) -> int:
         """Height [px] that it will take, so that nothing moves when it is drawn."""
-        return sum(panel.height + _HEAD for panel in self.panels) + _AXIS
+        lines = sum(1 if len(panel.series) < 3 else 2 for panel in self.panels)
+        return sum(panel.height for panel in self.panels) + lines * _LINE + _AXIS
 
     @property
     def data(self) -> str:

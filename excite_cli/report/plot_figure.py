@@ -137,6 +137,7 @@ _LOOKS: dict[Look, dict[str, Any]] = {
     "dashed": {"linewidth": 0.9, "linestyle": (0, (3, 1.5))},
     "dotted": {"linewidth": 0.9, "linestyle": (0, (1, 1))},
     "joined": {"linewidth": 1.1, "marker": "o", "markersize": 2.0},
+    "steps": {"linewidth": 1.1, "drawstyle": "steps-post"},
     "dots": {"linestyle": "none", "marker": "o", "markersize": 2.0, "alpha": 0.45},
     "marks": {"linestyle": "none", "marker": "o", "markersize": 3.2},
     "rings": {"linestyle": "none", "marker": "o", "markersize": 4.0, "markerfacecolor": "white"},

@@ -68,6 +68,14 @@ def residuals_in_time(
     return (Choice("Run", options),)
 
 
+def noise_by_joint(found: Diagnosis) -> dict[str, float]:
+    """Of the filtered torque [N·m] (N): of repeated periods, else what the model leaves as such."""
+    levels = found.processing.get("noise_rms")
+    if found.noise_floor is not None or not isinstance(levels, list):
+        return found.noise_floor or {}
+    return dict(zip(found.joint_names, map(float, levels), strict=False))
+
+
 def plots_in_time(
     traces: Sequence[TorqueTrace],
     joint_names: Sequence[str],

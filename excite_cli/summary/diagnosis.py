@@ -21,7 +21,12 @@ from excite_cli.diagnosis.words import (
     value_in_words,
 )
 from excite_cli.fields import data_of, public_data
-from excite_cli.report.residual_chart import IN_TIME, dependence_plots, residuals_in_time
+from excite_cli.report.residual_chart import (
+    IN_TIME,
+    dependence_plots,
+    noise_by_joint,
+    residuals_in_time,
+)
 from excite_cli.report.validity_chart import validity_section
 from excite_cli.shown.answer import (
     Answer,
@@ -107,14 +112,6 @@ def _time_section(found: Diagnosis, detail: Detail) -> Section:
         "held out."
     )
     return Section("diagnosis-time", "Residual in time", blocks, lead)
-
-
-def noise_by_joint(found: Diagnosis) -> dict[str, float]:
-    """Of the filtered torque [N·m] (N): of repeated periods, else what the model leaves as such."""
-    levels = found.processing.get("noise_rms")
-    if found.noise_floor is not None or not isinstance(levels, list):
-        return found.noise_floor or {}
-    return dict(zip(found.joint_names, map(float, levels), strict=False))
 
 
 def _validity_section(found: Diagnosis, detail: Detail) -> Section:

@@ -134,8 +134,8 @@
       stroke: pen,
       width: one.look === "band" ? 6 : one.look === "dotted" ? 1.2 : 1.4,
       dash: DASHES[one.look],
-      paths: dots ? () => null : undefined,
-      points: { show: dots || one.look === "joined", size: one.look === "dots" ? 3.5 : one.look === "marks" ? 6.5 : rings ? 9 : 5, fill: rings ? () => colour("card") : pen, stroke: pen, width: rings ? 1.5 : 0 },
+      paths: dots ? () => null : one.look === "steps" ? uPlot.paths.stepped({ align: 1 }) : undefined,
+      points: { show: dots || one.look === "joined" || one.look === "steps", size: one.look === "dots" ? 3.5 : one.look === "marks" ? 6.5 : rings ? 9 : 5, fill: rings ? () => colour("card") : pen, stroke: pen, width: rings ? 1.5 : 0 },
       alpha: one.look === "band" ? 0.4 : one.look === "dots" ? 0.6 : 1,
       value: (_, value) => value == null ? "" : figures(Number(value.toPrecision(3))),
     };
@@ -157,6 +157,7 @@
       const last = number === told.panels.length - 1;
       const { data, ends } = holder.numbers[number];
       const axis = { stroke: () => colour("ink"), grid: { stroke: () => colour("grid"), width: 1 }, ticks: { stroke: () => colour("grid"), width: 1, size: 5 }, font: font(12), labelFont: font(12), values: ticks };
+      const across = { space: told.counted ? 30 : 44, ...(told.counted ? { incrs: WHOLE } : {}) };
       const shown = () => told.span || [data[0][0], data[0][data[0].length - 1]];
       let telling = false;
       const plot = new uPlot({
@@ -169,7 +170,7 @@
         legend: { live: true, markers: { width: 2 } },
         scales: { x: { time: false, range: (_, low, high) => low === null ? shown() : [low, high] }, y: panel.span ? { range: panel.span } : panel.logarithmic ? { distr: 3, range: (_, low, high) => low === null ? [1, 10] : [low * 0.85, high * 1.18] } : {} },
         axes: [
-          last ? { ...axis, label: told.axis, labelSize: 20, size: 32, gap: 2, space: told.counted ? 30 : 44, ...(told.counted ? { incrs: WHOLE } : {}) } : { ...axis, show: true, size: 4, values: () => [], space: 60 },
+          last ? { ...axis, ...across, label: told.axis, labelSize: 20, size: 32, gap: 2 } : { ...axis, ...across, size: 4, values: () => [] },
           { ...axis, size: paper ? 34 : 46, gap: 3, space: 34, ...(panel.logarithmic ? { splits: decades, filter: (_, splits) => splits } : {}) },
         ],
         series: [{ label: told.axis.replace(/\s*\[.*$/, ""), value: (_, value) => figures(value) }, ...panel.series.map(seriesOf)],
