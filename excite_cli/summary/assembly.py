@@ -11,6 +11,7 @@ from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.identification.stored_model import StoredFit
+from excite_cli.robot.model import Robot
 from excite_cli.scoring.records import Score
 from excite_cli.shown.answer import KeyFigure, Page, Section, Text
 from excite_cli.summary.diagnosis import diagnosis_sections
@@ -32,7 +33,8 @@ class Source:
     """One file of a report.
 
     `name` tells it from the others on the page, `file` is its file name. A result needs the
-    `problem` that it was made for, and may show a `picture` of its robot.
+    `problem` that it was made for, and may show a `picture` of its robot. `robot`: of a diagnosis,
+    to draw its meshes.
     """
 
     name: str
@@ -40,6 +42,7 @@ class Source:
     content: Result | StoredFit | Diagnosis | Score
     problem: Problem | None = None
     picture: bool = True
+    robot: Robot | None = None
 
     @property
     def stage(self) -> int:
@@ -108,7 +111,8 @@ def _part(source: Source) -> _Part:
         told = Text(" ".join(sentences(content)), "bad" if content.alarms else "answer")
         return _Part(source, score_figures(content), score_sections(content), (told,))
     answer = Text(answer_in_words(content), "answer" if content.good else "bad")
-    return _Part(source, diagnosis_figures(content), diagnosis_sections(content), (answer,))
+    sections = diagnosis_sections(content, robot=source.robot)
+    return _Part(source, diagnosis_figures(content), sections, (answer,))
 
 
 def _distinct(parts: Sequence[_Part]) -> list[_Part]:

@@ -28,6 +28,7 @@ from excite_cli.report.residual_chart import (
     residuals_in_time,
 )
 from excite_cli.report.validity_chart import validity_section
+from excite_cli.robot.model import Robot
 from excite_cli.shown.answer import (
     Answer,
     Block,
@@ -91,9 +92,14 @@ def diagnosis_parts(found: Diagnosis, detail: Detail = Detail.BRIEF) -> Parts:
     return [answer_in_words(found), *parts_of(sections)]
 
 
-def diagnosis_sections(found: Diagnosis, detail: Detail = Detail.PAGE) -> list[Section]:
-    """Those that have something to say, in the order of a page."""
-    every = [make(found, detail) for make in SECTIONS]
+def diagnosis_sections(
+    found: Diagnosis, detail: Detail = Detail.PAGE, robot: Robot | None = None
+) -> list[Section]:
+    """Those that have something to say, in the order of a page, which shows the `robot`."""
+    every = [
+        errors_section(found, detail, robot) if make is errors_section else make(found, detail)
+        for make in SECTIONS
+    ]
     return [section for section in every if section.blocks]
 
 
