@@ -322,7 +322,8 @@ def fit_sections(stored: StoredFit) -> list[Section]:
                 f"{stored.closed_loop_bias[:1].upper()}{stored.closed_loop_bias[1:]}.",
                 *data_blocks(stored, fit.joint_names),
             ),
-            f"From {', '.join(stored.sources)}.",
+            f"Made by `excite identify` from {', '.join(stored.sources)}, held out: "
+            f"{stored.held_out_run}.",
         ),
     ]
 

@@ -289,6 +289,7 @@ def origin_section(result: Result, problem: Problem, file: str) -> Section:
     if left_out := problem.extension.left_out:
         blocks.append(f"Effects that the regressor leaves out: {'; '.join(left_out)}.")
     lead = (
+        "Made by `excite optimize`. "
         f"Minimised: {problem.spec.criterion.kind.replace('_', ' ')} of {problem.columns} columns, "
         f"{problem.variables} coefficients per motion, {len(problem.constraints)} kinds of "
         "constraints. The same config, seed and versions give the same numbers."

@@ -23,7 +23,7 @@ from excite_cli.report.chart import Chart
 from excite_cli.report.effect_chart import Cloud, law_line
 from excite_cli.report.page import render
 from excite_cli.report.plot import Plot
-from excite_cli.report.residual_chart import residuals_in_time
+from excite_cli.report.residual_chart import noise_by_joint, residuals_in_time
 from excite_cli.shown.answer import (
     Block,
     Charts,
@@ -182,6 +182,27 @@ def test_residuals_tell_held_out_from_training(sections: dict[str, Section]) -> 
     assert labels == ["run_3 (held out: took no part in the fit)", "run_1"]
     elbow = next(c for c in charts_of(sections["diagnosis-time"]) if c.title == "elbow")
     assert "the declared model without the effects found" in elbow.alternative
+    assert isinstance(elbow, Plot)
+    upper, lower = elbow.panels
+    assert [(each.label, each.look) for each in upper.series] == [
+        ("measured", "band"),  # behind
+        ("model", "line"),
+    ]
+    measured, model = (each.y for each in upper.series)
+    left, spread = np.sqrt(np.nanmean((measured - model) ** 2)), np.nanstd(measured)
+    assert upper.corner == f"fit {100 * (1 - left / spread):.3g} %"
+    assert lower.noise == 0.0  # unknown
+
+
+def test_the_noise_is_a_band_of_the_residual(diagnosis: Diagnosis) -> None:
+    joints = diagnosis.joint_names
+    levels = [0.25] * len(joints)
+    known = replace(diagnosis, processing={**diagnosis.processing, "noise_rms": levels})
+    chart = charts_of(section_of(known, "time"))[0]
+    assert isinstance(chart, Plot)
+    shown = chart.panels[1].noise
+    assert shown == pytest.approx(0.5 if chart.panels[1].axis == "residual [N·m]" else 500.0)
+    assert noise_by_joint(replace(known, noise_floor={joints[0]: 1.0})) == {joints[0]: 1.0}
 
 
 def test_held_out_blocks_of_a_run_are_shaded(diagnosis: Diagnosis) -> None:
