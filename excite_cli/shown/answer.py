@@ -124,7 +124,7 @@ class Fold:
 
 @dataclass(frozen=True)
 class Choice:
-    """Alternatives of which one is shown: a motion, a joint. On paper all are printed."""
+    """Alternatives of which one is shown, and printed: a motion, a joint."""
 
     label: str
     options: tuple[tuple[str, tuple["Block", ...]], ...]

@@ -1,5 +1,7 @@
 """The page of planned motions: condition numbers, motions, margins, and how they were made."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from excite_cli.diagnosis.words import counted
@@ -272,6 +274,11 @@ def origin_section(result: Result, problem: Problem, file: str) -> Section:
     blocks: list[Block] = [
         Table("This result", columns, (("file", file), *_origin(result, problem)), left=columns),
         Fold("The config, with all defaults (YAML)", (Text(result.config, "code"),)),
+        *(
+            [Fold("Columns of effects", (", ".join(names),))]
+            if (names := result.effect_names)
+            else []
+        ),
         Table("Versions", versions, rows, left=versions, folded=True),
     ]
     if result.checked_pairs:
@@ -308,9 +315,15 @@ def _origin(result: Result, problem: Problem) -> tuple[tuple[str, str], ...]:
         ("robot hash", result.fingerprint),
         ("measured rows", str(len(robot.rows))),
         ("base parameters", str(problem.base.rank)),
-        ("columns of effects", ", ".join(result.effect_names) or "none"),
+        ("columns of effects", _kinds(result.effect_names)),
         ("trajectory", f"{problem.spec.trajectory.family}, {in_figures(trajectory.duration)} s"),
         ("seed", str(result.seed)),
         ("earlier data", ", ".join(result.priors) or "none"),
         ("computation time", f"{seconds:.1f} s, {counted(evaluations, 'evaluation')}"),
     )
+
+
+def _kinds(names: Sequence[str]) -> str:
+    """`12: viscous_friction, ripple` of columns as `ripple[elbow].sin`."""
+    kinds = dict.fromkeys(name.partition("[")[0] for name in names)
+    return f"{len(names)}: {', '.join(kinds)}" if names else "none"
