@@ -1,7 +1,7 @@
 """One page from several files: what each kind has to say, and several of a kind side by side."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -84,11 +84,7 @@ def page_of(sources: Sequence[Source], show: Callable[[str, int], None]) -> Page
         "Made by excite from " + ", ".join(source.file for source in sources),
         tuple(figures),
         (*compared, *sections) if first else (*sections, *compared),
-        tuple(
-            answer
-            for part in parts
-            for answer in (*part.answers, *(part.alone if len(parts) == 1 else ()))
-        ),
+        tuple(_answers(parts)),
     )
 
 
@@ -145,6 +141,16 @@ def _distinct(parts: Sequence[_Part]) -> list[_Part]:
         )
         found.append(replace(part, sections=sections, figures=figures))
     return found
+
+
+def _answers(parts: Sequence[_Part]) -> Iterator[Text]:
+    """What every source says first; several of a kind say of which file."""
+    stages = Counter(part.source.stage for part in parts)
+    for part in parts:
+        for answer in (*part.answers, *(part.alone if len(parts) == 1 else ())):
+            several = stages[part.source.stage] > 1 and part.source.problem is None
+            of = f"{part.source.name}: " if several else ""
+            yield replace(answer, text=of + answer.text)
 
 
 def _compared(sources: Sequence[Source]) -> tuple[Section, ...]:

@@ -59,6 +59,7 @@ def test_two_diagnoses_are_side_by_side_first_and_figures_lead_to_their_own(
     page = _page(Source("one", "one.h5", diagnosis), Source("two", "two.h5", diagnosis))
     anchors = [section.anchor for section in page.sections]
     assert anchors[0] == "compare-diagnoses"
+    assert [answer.text.split(":")[0] for answer in page.answers] == ["one", "two"]
     led = [figure.anchor for figure in page.figures]
     assert set(led) <= set(anchors)
     assert len(set(led)) == len(led)
