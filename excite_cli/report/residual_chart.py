@@ -69,11 +69,14 @@ def residuals_in_time(
 
 
 def noise_by_joint(found: Diagnosis) -> dict[str, float]:
-    """Of the filtered torque [N·m] (N): of repeated periods, else what the model leaves as such."""
+    """Of the filtered torque [N·m] (N), as the sentences about what is unexplained have it.
+
+    Of joints on which nothing is, of repeated periods, else what the model leaves as noise.
+    """
     levels = found.processing.get("noise_rms")
-    if found.noise_floor is not None or not isinstance(levels, list):
-        return found.noise_floor or {}
-    return dict(zip(found.joint_names, map(float, levels), strict=False))
+    left = map(float, levels) if isinstance(levels, list) else ()
+    known = found.noise_floor or dict(zip(found.joint_names, left, strict=False))
+    return known | {each.joint: each.noise or 0.0 for each in found.excess_residuals}
 
 
 def plots_in_time(

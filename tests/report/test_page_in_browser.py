@@ -186,4 +186,5 @@ def test_on_paper_the_chosen_motion_is_printed_and_no_button(page: Any) -> None:
     assert not page.locator("#theme").is_visible()
     assert not page.locator("nav").is_visible()
     for plot in page.locator(".option:not([hidden]) .plot").all():
+        plot.locator("canvas").first.wait_for(state="attached")
         assert plot.locator("canvas").count() == 2 or plot.locator("canvas").count() == 1

@@ -13,6 +13,7 @@ from excite_cli.diagnosis.records import (
     ConfoundedCandidate,
     Diagnosis,
     EffectRecord,
+    ExcessResidual,
     JointAlias,
     NamedEffect,
 )
@@ -175,7 +176,9 @@ def test_evidence_tells_of_pairs(diagnosis: Diagnosis, beside: tuple[str, ...], 
     assert captions[1] == captions[2]
 
 
-def test_residuals_tell_held_out_from_training(sections: dict[str, Section]) -> None:
+def test_residuals_tell_held_out_from_training(
+    sections: dict[str, Section], diagnosis: Diagnosis
+) -> None:
     (choice,) = sections["diagnosis-time"].blocks
     assert isinstance(choice, Choice)
     labels = [label for label, _ in choice.options]
@@ -191,7 +194,7 @@ def test_residuals_tell_held_out_from_training(sections: dict[str, Section]) -> 
     measured, model = (each.y for each in upper.series)
     left, spread = np.sqrt(np.nanmean((measured - model) ** 2)), np.nanstd(measured)
     assert upper.corner == f"fit {100 * (1 - left / spread):.3g} %"
-    assert lower.noise == 0.0  # unknown
+    assert lower.noise == pytest.approx(2.0 * noise_by_joint(diagnosis)["elbow"])
 
 
 def test_the_noise_is_a_band_of_the_residual(diagnosis: Diagnosis) -> None:
@@ -202,7 +205,10 @@ def test_the_noise_is_a_band_of_the_residual(diagnosis: Diagnosis) -> None:
     assert isinstance(chart, Plot)
     shown = chart.panels[1].noise
     assert shown == pytest.approx(0.5 if chart.panels[1].axis == "residual [N·m]" else 500.0)
-    assert noise_by_joint(replace(known, noise_floor={joints[0]: 1.0})) == {joints[0]: 1.0}
+    assert noise_by_joint(replace(known, excess_residuals=())) == dict.fromkeys(joints, 0.25)
+    told = ExcessResidual(joints[1], 1.0, 0.1, 0.02, "band", True, 0.0, ())
+    floor = replace(known, noise_floor=dict.fromkeys(joints, 1.0), excess_residuals=(told,))
+    assert noise_by_joint(floor) == dict.fromkeys(joints, 1.0) | {joints[1]: 0.02}
 
 
 def test_held_out_blocks_of_a_run_are_shaded(diagnosis: Diagnosis) -> None:
