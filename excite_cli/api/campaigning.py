@@ -42,6 +42,7 @@ from excite_cli.measurement.torque import given_law
 from excite_cli.report.page import render
 from excite_cli.shown.note import Level, Note, Tell, log_note, unheard
 from excite_cli.simulation.settings import SimulationSettings
+from excite_cli.store.diagnosis_file import read_diagnosis
 from excite_cli.store.own_file import versions
 from excite_cli.summary.campaign import campaign_answer as campaign_answer
 from excite_cli.summary.campaign import round_in_words, rounds_page
@@ -214,7 +215,15 @@ class _Loop:
 
     def write_page(self, state: Campaign) -> None:
         """The page of all rounds, as far as they are."""
-        page = rounds_page(state, self.case.robot.name)
+        done = {
+            f"diagnosis of round {each.number}": diagnosis_of(each.number)
+            for each in state.rounds
+            if each.learned is not None
+        }
+        newest = self.folder / next(reversed(done.values())) if done else None
+        files = {"config with the effects found": MODEL, **done} if done else {}
+        last = read_diagnosis(newest) if newest is not None and newest.exists() else None
+        page = rounds_page(state, self.case.robot.name, files, last)
         write_text_atomically(self.folder / PAGE, render(page))
 
     def _learned(self, state: Campaign, last: CampaignRound) -> RoundFindings:

@@ -11,14 +11,16 @@ from excite_cli.api.arguments import checked, page_path, paths_in, refuse_twice
 from excite_cli.api.loading import rebuilt_problem, with_own_margins
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_atomically, write_text_atomically
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.diagnosis.records import Diagnosis
-from excite_cli.errors import ConfigError, FileError
+from excite_cli.errors import ConfigError, ExciteError, FileError
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.given_files import refuse_inputs_as_outputs
 from excite_cli.identification.stored_model import StoredFit
 from excite_cli.report.page import render
 from excite_cli.report.plot_figure import matplotlib_part, save_figure, save_pages
+from excite_cli.robot.model import Robot, build_measured_robot
 from excite_cli.scoring.records import Score
 from excite_cli.shown.answer import Answer
 from excite_cli.shown.note import unheard
@@ -271,7 +273,7 @@ def write_report(
         if figures is not None:
             drawn = write_figures(told, problems, (Path(figures), format, overwrite), progress)
         if page is not None:
-            write_text_atomically(page, _page_text(told, problems, picture, progress))
+            write_text_atomically(page, _page_text(told, problems, config, picture, progress))
     doubts = (
         f"{each.path}: {words}"
         for each in told
@@ -298,14 +300,29 @@ def report_answer(found: Report) -> Answer:
     return Answer(parts, data)
 
 
+def _robot(file: ReportedFile, config: str | Path | None) -> Robot | None:
+    """The robot of a diagnosis, where its URDF is still there and the same."""
+    found = file.content
+    if not isinstance(found, Diagnosis):
+        return None
+    folder = Path(found.config_folder) if config is None else Path(config).resolve().parent
+    try:
+        robot = build_measured_robot(parse_spec(found.config).robot, folder)
+    except ExciteError:
+        return None
+    return robot if robot.fingerprint() == found.fingerprint else None
+
+
 def _page_text(
     told: Sequence[ReportedFile],
     problems: Mapping[Path, Problem],
+    config: str | Path | None,
     picture: bool,
     progress: Progress,
 ) -> str:
+    robots = [_robot(each, config) if picture else None for each in told]
     sources = [
-        Source(each.name, each.path.name, each.content, problems.get(each.path), picture)
-        for each in told
+        Source(each.name, each.path.name, each.content, problems.get(each.path), picture, robot)
+        for each, robot in zip(told, robots, strict=True)
     ]
     return render(page_of(sources, lambda name, done: progress(name, done, len(told))))

@@ -15,6 +15,7 @@ from excite_cli.report.plot import Curve, Panel, Plot
 from excite_cli.robot.model import Array
 
 _HEIGHT = 200  # px
+_ROUNDING = 1e-11  # of the largest singular value
 
 
 def condition_chart(result: Result) -> Plot:
@@ -69,10 +70,13 @@ def spectrum_chart(result: Result, problem: Problem) -> Plot:
         for word, _, sigma in spectra
     )
     count = len(spectra[0][2])
+    shown = [np.where(sigma > _ROUNDING * sigma[0], sigma, np.nan) for _, _, sigma in spectra]
     series = tuple(
-        Curve(word, np.where(sigma > 0, sigma, np.nan), colour, "joined")
-        for word, colour, sigma in spectra
+        Curve(word, sigma, colour, "joined")
+        for (word, colour, _), sigma in zip(spectra, shown, strict=True)
     )
+    zero = int(np.sum(np.isnan(shown[0])))
+    left_out = f" {zero} that are zero but for rounding are not drawn." if zero else ""
     return Plot(
         "Singular values of the stacked regressor",
         f"{count} singular values of the stacked base regressor. {said}.",
@@ -80,7 +84,7 @@ def spectrum_chart(result: Result, problem: Problem) -> Plot:
         np.arange(1.0, count + 1),
         (Panel(f"size [{spectrum_unit(problem)}]", series, height=_HEIGHT, logarithmic=True),),
         caption="The flatter, the more evenly all parameters show. Largest over smallest is the "
-        "condition number.",
+        f"condition number.{left_out}",
         counted=True,
     )
 

@@ -14,11 +14,11 @@ import numpy as np
 from excite_cli.report.chart import Colour
 from excite_cli.robot.model import Array
 
-Look = Literal["line", "dashed", "dotted", "joined", "dots", "marks", "rings"]
+Look = Literal["line", "band", "dashed", "dotted", "joined", "steps", "dots", "marks", "rings"]
 
 _STEPS = 65533  # of two bytes; two values are kept
 _GAP, _ABSENT = -32768, 32767
-_LEGEND, _AXIS = 30, 34  # px
+_LINE, _AXIS = 20, 34  # px, of text above a panel
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,8 @@ class Curve:
     """One quantity over the chart's x: `y` (T,), NaN where a line is to be broken.
 
     Infinite where it has no point of its own: a line goes on there. `low`, `high` (T,): ends of a
-    whisker at each point. `joined` is a line with its points.
+    whisker at each point. `joined` is a line with its points, `steps` keeps each value to
+    the next, `band` is broad and pale.
     """
 
     label: str
@@ -39,10 +40,11 @@ class Curve:
 
 @dataclass(frozen=True)
 class Panel:
-    """Series over one vertical axis, `axis` its label with unit.
+    """Series over one vertical axis, `axis` its label with unit; the first are behind the others.
 
     `span`: what the axis shows; without, what its series need. Below and above `limits` (infinite:
-    none) it is shaded as forbidden. On a `logarithmic` axis values must be above 0.
+    none) it is shaded as forbidden; within ± `noise` (0: unknown) as what says nothing. `corner`:
+    a figure that sums it up. On a `logarithmic` axis values must be above 0.
     """
 
     axis: str
@@ -51,6 +53,8 @@ class Panel:
     limits: tuple[float, float] = (-np.inf, np.inf)
     height: int = 150
     logarithmic: bool = False
+    noise: float = 0.0
+    corner: str = ""
 
 
 @dataclass(frozen=True)
@@ -77,7 +81,8 @@ class Plot:
     @property
     def room(self) -> int:
         """Height [px] that it will take, so that nothing moves when it is drawn."""
-        return sum(panel.height + _LEGEND for panel in self.panels) + _AXIS
+        lines = sum(1 if len(panel.series) < 3 else 2 for panel in self.panels)
+        return sum(panel.height for panel in self.panels) + lines * _LINE + _AXIS
 
     @property
     def data(self) -> str:
@@ -126,6 +131,8 @@ def _panel(panel: Panel) -> dict[str, Any]:
         "axis": panel.axis,
         "span": panel.span,
         "limits": finite,
+        "noise": float(f"{panel.noise:.4g}"),
+        "corner": panel.corner,
         "height": panel.height,
         "logarithmic": panel.logarithmic,
         "series": [_series(each, panel.logarithmic) for each in panel.series],

@@ -133,9 +133,11 @@ _COLOURS: dict[Colour, str] = {
 }  # fmt: skip
 _LOOKS: dict[Look, dict[str, Any]] = {
     "line": {"linewidth": 1.1},
+    "band": {"linewidth": 4.0, "alpha": 0.4},
     "dashed": {"linewidth": 0.9, "linestyle": (0, (3, 1.5))},
     "dotted": {"linewidth": 0.9, "linestyle": (0, (1, 1))},
     "joined": {"linewidth": 1.1, "marker": "o", "markersize": 2.0},
+    "steps": {"linewidth": 1.1, "drawstyle": "steps-post"},
     "dots": {"linestyle": "none", "marker": "o", "markersize": 2.0, "alpha": 0.45},
     "marks": {"linestyle": "none", "marker": "o", "markersize": 3.2},
     "rings": {"linestyle": "none", "marker": "o", "markersize": 4.0, "markerfacecolor": "white"},
@@ -206,8 +208,12 @@ def _plot_figure_draw(figure: "Figure", grid: Any, plot: Plot, title: str) -> No
 
 def draw_panel(axes: "Axes", x: Array, panel: Panel) -> None:
     """All series of a panel over x (T,), and its axis."""
+    if panel.noise:
+        axes.axhspan(-panel.noise, panel.noise, color=HELD_OUT, linewidth=0, label="_")
     for series in panel.series:
         _draw_series(axes, x, series)
+    if panel.corner:
+        axes.set_title(panel.corner, loc="right", fontsize=8.0, pad=2)
     if panel.logarithmic:
         values = np.concatenate([series.y for series in panel.series])
         logarithmic(axes, values[np.isfinite(values)])

@@ -19,6 +19,7 @@ from excite_cli.excitation.problem import Problem
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.geometry.obstacles import FLOOR, Box, Plane
 from excite_cli.report.chart import Chart, in_figures, side_view, svg_line
+from excite_cli.report.robot_faces import Faces, drawn_faces
 from excite_cli.robot.model import Array
 from excite_cli.robot.tree import Skeleton
 from excite_cli.trajectory.fade import Segment
@@ -151,49 +152,77 @@ def _drawn(
 
 
 _DRAWN_WIDTH, _ROW, _DRAWN_MARGIN = 284.0, 13.0, 12.0  # pt
-_ROBOT = 0.52  # of the width; the rest is for names
-_LEAST = 150.0  # pt of height
+_ROBOT = 0.56  # of the width; the rest is for names
+_LEAST = 210.0  # pt of height
+_SCALE, _STEPS = 22.0, 24  # pt below, and patches of colour
 
 
 def robot_chart(
-    title: str, skeleton: Skeleton, names: Sequence[str], shares: Mapping[str, float], what: str
+    title: str,
+    skeleton: Skeleton,
+    names: Sequence[str],
+    shares: Mapping[str, float],
+    what: str,
+    faces: Faces | None = None,
 ) -> Chart:
-    """Joints as dots, from green (the least share) to vermilion (the most), each with its name.
+    """Joints as dots, from green (no share) to vermilion (the most), each with its name; a scale.
 
     `shares` by joint; one that is not known (NaN, missing) is drawn without colour. `what` says
-    what the shares are.
+    what the shares are. Where `faces` are known, what a joint moves has its colour.
     """
     known = {name: share for name, share in shares.items() if isfinite(share)}
     most = max(known.values(), default=1.0) or 1.0
     height = max(_LEAST, _ROW * len(names) + 2 * _DRAWN_MARGIN)
-    points, base, tips = _placed(skeleton, height)
-    parts = [f'<svg viewBox="0 0 {_DRAWN_WIDTH:g} {height:g}">']
-    for j, parent in enumerate(skeleton.parents):
-        parts.append(svg_line(base if parent < 0 else points[parent], points[j], 3.0, "var(--ink)"))
-        parts.append(svg_line(points[j], tips[j], 3.0, "var(--ink)"))
+    points, base, tips, place = _placed(skeleton, height, faces)
+    colours = [_colour(known.get(name), most) for name in names]
+    style, parts = "", list[str]()
+    if faces is not None:
+        style, parts = drawn_faces(faces, place, [*colours, "var(--still)"])
+    else:
+        for j, parent in enumerate(skeleton.parents):
+            start = base if parent < 0 else points[parent]
+            parts.append(svg_line(start, points[j], 3.0, "var(--ink)"))
+            parts.append(svg_line(points[j], tips[j], 3.0, "var(--ink)"))
     rows = np.argsort(points[:, 1], kind="stable")
     left = _DRAWN_WIDTH * _ROBOT + 6.0
     step = (height - 2 * _DRAWN_MARGIN) / max(len(names), 1)
     for row, j in enumerate(rows):
         y = _DRAWN_MARGIN + (row + 0.5) * step
-        parts.append(svg_line(points[j], np.array([left, y]), 0.8, "var(--grid)"))
+        parts.append(svg_line(points[j], np.array([left, y]), 0.6, "var(--limit)"))
         share = known.get(names[j])
         told = "–" if share is None else f"{share:.1%}"
         parts.append(
             f'<text x="{left + 3:.1f}" y="{y + 3:.1f}" style="font-size: 9px; fill: var(--ink)">'
             f"{escape(names[j])} {told}</text>"
         )
-    for j, name in enumerate(names):
-        (x, y), colour = points[j], _colour(known.get(name), most)
+    for (x, y), colour in zip(points, colours, strict=True):
         parts.append(
-            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="5" style="fill: {colour}; '
+            f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3.5" style="fill: {colour}; '
             f'stroke: var(--card); stroke-width: 1"></circle>'
         )
     ranked = sorted(known.items(), key=lambda item: -item[1])
     worst = ", ".join(f"{name} {share:.1%}" for name, share in ranked)
-    return Chart(
-        title, "".join([*parts, "</svg>"]), f"{what}, the most first: {worst}.", f"{what}."
-    )
+    parts += _scale(most, height)
+    head = f'<svg viewBox="0 0 {_DRAWN_WIDTH:g} {height + _SCALE:g}" style="{style}">'
+    svg = "".join([head, *parts, "</svg>"])
+    return Chart(title, svg, f"{what}, the most first: {worst}.", f"{what}.")
+
+
+def _scale(most: float, top: float) -> list[str]:
+    """From no share to the most, with their figures."""
+    width = _DRAWN_WIDTH * _ROBOT - 2 * _DRAWN_MARGIN
+    step = width / _STEPS
+    parts = [
+        f'<rect x="{_DRAWN_MARGIN + k * step:.1f}" y="{top:.1f}" width="{step + 0.3:.1f}" '
+        f'height="5" style="fill: {_colour((k + 0.5) / _STEPS, 1.0)}"></rect>'
+        for k in range(_STEPS)
+    ]
+    ends = ((_DRAWN_MARGIN, "start", "0"), (_DRAWN_MARGIN + width, "end", f"{most:.1%}"))
+    return parts + [
+        f'<text x="{x:.1f}" y="{top + 14:.1f}" text-anchor="{anchor}" '
+        f'style="font-size: 8.5px; fill: var(--ink)">{text}</text>'
+        for x, anchor, text in ends
+    ]
 
 
 def _colour(share: float | None, most: float) -> str:
@@ -202,12 +231,18 @@ def _colour(share: float | None, most: float) -> str:
     return f"color-mix(in oklab, var(--vermilion) {100 * share / most:.0f}%, var(--green))"
 
 
-def _placed(skeleton: Skeleton, height: float) -> tuple[Array, Array, Array]:
-    """Joints (n, 2), base (2,) and tips (n, 2) in the drawing, as large as there is room."""
+def _placed(
+    skeleton: Skeleton, height: float, faces: Faces | None
+) -> tuple[Array, Array, Array, tuple[float, Array]]:
+    """Joints (n, 2), base (2,) and tips (n, 2) in the drawing, as large as there is room.
+
+    Then the scale [pt/m] and the shift (2,) [pt] by which they were placed.
+    """
     flat, _ = side_view(np.array([skeleton.base, *skeleton.joints, *skeleton.tips]))
-    low, size = flat.min(axis=0), np.ptp(flat, axis=0)
+    every = flat if faces is None else np.vstack([flat, side_view(faces.corners)[0].reshape(-1, 2)])
+    low, size = every.min(axis=0), np.ptp(every, axis=0)
     room = np.array([_DRAWN_WIDTH * _ROBOT, height]) - 2 * _DRAWN_MARGIN
     scale = float((room / np.maximum(size, 1e-9)).min())
-    placed = _DRAWN_MARGIN + (flat - low) * scale + (room - size * scale) / 2
-    n = len(skeleton.joints)
-    return placed[1 : n + 1], placed[0], placed[n + 1 :]
+    shift = _DRAWN_MARGIN + (room - size * scale) / 2 - low * scale
+    placed, n = flat * scale + shift, len(skeleton.joints)
+    return placed[1 : n + 1], placed[0], placed[n + 1 :], (scale, shift)

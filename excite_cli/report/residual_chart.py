@@ -1,8 +1,9 @@
 """Torque over time, run by run, and the residual over what it depends on."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from types import MappingProxyType
 
 import numpy as np
 
@@ -37,23 +38,52 @@ def torque_or_force(unit: str) -> str:
 
 # Points of all lines together, and of one line at most and at least: the page must stay light.
 _BUDGET, _MOST, _FEWEST = 240_000, 700, 150
+_SIGMAS = 2.0  # of the noise, on either side of no residual
+
+
+# What such a card shows, as its section says it.
+IN_TIME = (
+    "Filtered torque, as used in the fit. Above: measured (broad) and predicted by the model "
+    "(thin); in the corner the fit, 100 % less the residual's RMS as a share of the measured "
+    "torque's about its mean. Below: residuals"
+)
 
 
 def residuals_in_time(
-    traces: Sequence[TorqueTrace], joint_names: Sequence[str], units: Sequence[str]
+    traces: Sequence[TorqueTrace],
+    joint_names: Sequence[str],
+    units: Sequence[str],
+    noise: Mapping[str, float] | None = None,
 ) -> tuple[Block, ...]:
-    """A card per joint, a choice of runs; parts that took no part in the fit are shaded."""
+    """A card per joint, a choice of runs; parts that took no part in the fit are shaded.
+
+    `noise` of the torque [N·m] (N) by joint, where it is known.
+    """
     options = tuple(
         (label, (Charts(charts),))
-        for label, charts in plots_in_time(traces, joint_names, units).items()
+        for label, charts in plots_in_time(traces, joint_names, units, noise or {}).items()
     )
     if len(options) < 2:
         return options[0][1] if options else ()
     return (Choice("Run", options),)
 
 
+def noise_by_joint(found: Diagnosis) -> dict[str, float]:
+    """Of the filtered torque [N·m] (N), as the sentences about what is unexplained have it.
+
+    Of joints on which nothing is, of repeated periods, else what the model leaves as noise.
+    """
+    levels = found.processing.get("noise_rms")
+    left = map(float, levels) if isinstance(levels, list) else ()
+    known = found.noise_floor or dict(zip(found.joint_names, left, strict=False))
+    return known | {each.joint: each.noise or 0.0 for each in found.excess_residuals}
+
+
 def plots_in_time(
-    traces: Sequence[TorqueTrace], joint_names: Sequence[str], units: Sequence[str]
+    traces: Sequence[TorqueTrace],
+    joint_names: Sequence[str],
+    units: Sequence[str],
+    noise: Mapping[str, float] = MappingProxyType({}),
 ) -> dict[str, tuple[Plot, ...]]:
     """A plot per joint, by the run and what it was for."""
     runs: dict[str, list[TorqueTrace]] = {}
@@ -65,7 +95,7 @@ def plots_in_time(
     for run, parts in runs.items():
         ordered = sorted(parts, key=lambda part: float(part.t[0]))
         found[_label(run, parts)] = tuple(
-            _card(ordered, j, name, unit, points)
+            _card(ordered, j, name, unit, points, noise.get(name, 0.0))
             for j, (name, unit) in enumerate(zip(joint_names, units, strict=True))
         )
     return found
@@ -77,7 +107,9 @@ def _label(run: str, parts: Sequence[TorqueTrace]) -> str:
     return run
 
 
-def _card(parts: Sequence[TorqueTrace], j: int, name: str, unit: str, points: int) -> Plot:
+def _card(
+    parts: Sequence[TorqueTrace], j: int, name: str, unit: str, points: int, noise: float
+) -> Plot:
     left = [part.measured[:, j] - part.predicted[:, j] for part in parts]
     before = [part.measured[:, j] - part.before[:, j] for part in parts if part.before is not None]
     what = torque_or_force(unit).capitalize()
@@ -89,19 +121,26 @@ def _card(parts: Sequence[TorqueTrace], j: int, name: str, unit: str, points: in
     measured = _joined([part.measured[at, j] for part in parts])
     predicted = _joined([part.predicted[at, j] for part in parts])
     factor, of_torque = readable_unit(unit, _largest(measured))
-    rest = [Curve("residual", measured - predicted, "vermilion")]
+    rest = [Curve("model", measured - predicted, "vermilion")]
     if before:
         alone = _joined([part.before[at, j] for part in parts if part.before is not None])
-        rest.insert(0, Curve("residual, declared model", measured - alone, "muted", "dashed"))
+        rest.insert(0, Curve("declared", measured - alone, "muted", "dashed"))
     small, of_left = readable_unit(unit, max(_largest(each.y) for each in rest))
     upper = Panel(
         f"{torque_or_force(unit)} [{of_torque}]",
         (
-            Curve("measured", factor * measured, "muted"),
+            Curve("measured", factor * measured, "muted", "band"),
             Curve("model", factor * predicted, "blue"),
         ),
+        corner=_fit(measured, predicted),
     )
-    lower = Panel(f"residual [{of_left}]", tuple(replace(each, y=small * each.y) for each in rest))
+    known = noise if np.isfinite(noise) else 0.0
+    lower = Panel(
+        f"residual [{of_left}]",
+        tuple(replace(each, y=small * each.y) for each in rest),
+        noise=_SIGMAS * small * known,
+        corner=f"noise: ±{_SIGMAS:g} × {small * known:.2g}" if known else "",
+    )
     mixed = {part.held_out for part in parts} == {False, True}
     return Plot(
         name,
@@ -127,6 +166,15 @@ def _instants(parts: Sequence[Array]) -> Array:
 def _joined(parts: Sequence[Array]) -> Array:
     """Values at `_instants`."""
     return np.concatenate([parts[0], *(np.r_[np.nan, part] for part in parts[1:])])
+
+
+def _fit(measured: Array, predicted: Array) -> str:
+    """`fit 93 %`: 100 % where nothing is left, 0 % where a constant is as good."""
+    known = np.isfinite(measured) & np.isfinite(predicted)
+    if not known.any() or not (spread := float(np.std(measured[known]))) > 0.0:
+        return ""
+    left = float(np.sqrt(np.mean((measured[known] - predicted[known]) ** 2)))
+    return f"fit {100.0 * (1.0 - left / spread):.3g} %"
 
 
 def _rms(series: Sequence[Array]) -> str:

@@ -47,7 +47,7 @@ def validity_section(
         "parameters comes on top, as in `excite score FILE --job PLAN` for a whole motion."
     )
     blocks = (Charts(charts),) if charts else ()
-    return Section("validity", "Where the model can be trusted", blocks, lead)
+    return Section("validity", "Where the model can be trusted", blocks, lead, on_paper=False)
 
 
 def _error(validity: Validity, speed: Array, load: float) -> Array:

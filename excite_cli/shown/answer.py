@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from html import escape
 from types import MappingProxyType
-from typing import Any, Self, TypeVar
+from typing import Any, Literal, Self, TypeVar
 
 from excite_cli.errors import ConfigError, nearest, optional_module
 
@@ -49,7 +49,7 @@ class Table:
     all others hold figures and are aligned to the right. `bold`: rows by their number. Before the
     rows of `parted` there is a gap. `note` explains columns; where a page is shown, a table that is
     `folded` has to be opened. `shades`: how dark the cells of each row after the first are there,
-    from 0 to 1.
+    from 0 to 1. Cells of the columns `files` name files beside the page.
     """
 
     title: str
@@ -62,6 +62,7 @@ class Table:
     note: str = ""
     folded: bool = False
     shades: tuple[tuple[float, ...], ...] = ()
+    files: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Raise ValueError for a row of another length than the columns, or an unknown column."""
@@ -123,7 +124,7 @@ class Fold:
 
 @dataclass(frozen=True)
 class Choice:
-    """Alternatives of which one is shown: a motion, a joint. On paper all are printed."""
+    """Alternatives of which one is shown, and printed: a motion, a joint."""
 
     label: str
     options: tuple[tuple[str, tuple["Block", ...]], ...]
@@ -139,22 +140,31 @@ Block = Part | Text | Charts | Fold | Choice
 class Section:
     """A part of a document with an entry in its table of contents; `lead` is its finding.
 
-    Answers have the blocks alone.
+    Answers have the blocks alone. `on_paper`: whether a page prints it.
     """
 
     anchor: str
     title: str
     blocks: tuple[Block, ...]
     lead: str = ""
+    on_paper: bool = True
+
+
+Verdict = Literal["", "good", "open", "bad"]
 
 
 @dataclass(frozen=True)
 class KeyFigure:
-    """A figure that sums up a page: what it is, its value with unit, and a remark."""
+    """A figure that sums up a page: what it is, its value with unit, and a remark.
+
+    `verdict` colours it; `anchor`: of the section that says more.
+    """
 
     name: str
     value: str
     remark: str = ""
+    verdict: Verdict = ""
+    anchor: str = ""
 
 
 @dataclass(frozen=True)

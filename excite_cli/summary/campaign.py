@@ -1,12 +1,16 @@
 """The rounds of a campaign, and how it ended, in words."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from excite_cli.campaign.records import Campaign, CampaignRound, RoundFindings
+from excite_cli.diagnosis.records import Diagnosis
+from excite_cli.diagnosis.words import counted
 from excite_cli.fields import data_of
 from excite_cli.report.plot import Curve, Panel, Plot
+from excite_cli.report.residual_chart import IN_TIME, noise_by_joint, residuals_in_time
 from excite_cli.shown.answer import (
     Answer,
     Charts,
@@ -16,6 +20,7 @@ from excite_cli.shown.answer import (
     Section,
     Table,
     Text,
+    Verdict,
     show,
 )
 
@@ -83,42 +88,77 @@ def campaign_answer(campaign: Campaign, folder: Path, written: dict[str, str]) -
 # The page, which grows with the rounds.
 
 
-def rounds_page(campaign: Campaign, robot: str) -> Page:
-    """Error, effects, precision and motion time of every round so far, and what is open."""
+def rounds_page(
+    campaign: Campaign, robot: str, files: Mapping[str, str], last: Diagnosis | None = None
+) -> Page:
+    """Error, effects, precision and motion time of every round so far, and what is open.
+
+    `files` beside the page, by what they are; `last`: the newest diagnosis.
+    """
     done = [each for each in campaign.rounds if each.learned is not None]
     told = (
         campaign.reason or f"Round {campaign.rounds[-1].number if campaign.rounds else 1} goes on."
     )
-    kind = {"complete": "good", "": "plain"}.get(campaign.ended, "bad")
+    kind = {"complete": "good", "": "answer"}.get(campaign.ended, "bad")
     sections = [Section("rounds", "Rounds", (rounds_table(campaign),))]
     if done:
         sections.insert(0, Section("errors", "Error and precision", (Charts((_plot(done),)),)))
         sections.append(_open(done[-1]))
-    sections.append(_motions(campaign))
+    if last is not None:
+        sections.append(_residual(last))
+    sections.append(_motions(campaign, files))
+    count = f"{counted(len(campaign.rounds), 'round')}, {counted(len(campaign.motions), 'motion')}"
     return Page(
         f"Campaign of {robot}",
-        told,
-        (
-            KeyFigure("rounds", str(len(campaign.rounds))),
-            KeyFigure("motion", f"{campaign.seconds:.0f} s", f"{len(campaign.motions)} motions"),
-            *(_figures(done[-1]) if done else ()),
-        ),
+        f"{count}, {campaign.seconds:.0f} s of motion",
+        (*(_figures(done[-1]) if done else ()), _state(campaign, done)),
         tuple(sections),
-        (Text(told, kind),) if campaign.ended else (),
+        (Text(told, kind),),
     )
 
 
 def _figures(last: CampaignRound) -> tuple[KeyFigure, ...]:
     learned = last.learned
     assert learned is not None
+    verdict: Verdict = "open" if learned.open else "good"
     return (
         KeyFigure(
             "torque missed",
             f"{learned.after:.2%}",
             f"on {last.motions[-1].name}, which took no part; {learned.before:.2%} without effects",
+            verdict,
+            "errors",
         ),
-        KeyFigure("effects", str(len(learned.effects)), ", ".join(learned.effects)),
+        KeyFigure(
+            "effects",
+            str(len(learned.effects)),
+            "\n".join(learned.effects),
+            "open" if learned.pairs else "good",
+            "rounds",
+        ),
     )
+
+
+def _state(campaign: Campaign, done: Sequence[CampaignRound]) -> KeyFigure:
+    words: dict[str, tuple[str, Verdict]] = {
+        "complete": ("converged", "good"),
+        "budget": ("the budget is spent", "bad"),
+        "stuck": ("effects were not separated", "bad"),
+        "": ("goes on", "open"),
+    }
+    value, verdict = words[campaign.ended]
+    left = done[-1].learned.open if done and done[-1].learned else ()
+    remark = counted(len(left), "open question") if left else "nothing is open" if done else ""
+    anchor = "open" if done else "motions"
+    return KeyFigure("the campaign", value, remark, verdict, anchor)
+
+
+def _residual(last: Diagnosis) -> Section:
+    """Of the newest motion, which was held out."""
+    names, units, noise = last.joint_names, last.torque_units, noise_by_joint(last)
+    blocks = residuals_in_time(last.held_out_traces, names, units, noise)
+    lead = f"{IN_TIME} of the model with all effects and of the declared one, over the noise."
+    return Section("residual", f"Residual of {last.held_out_run}", blocks, lead)
 
 
 def _plot(done: list[CampaignRound]) -> Plot:
@@ -140,23 +180,46 @@ def _plot(done: list[CampaignRound]) -> Plot:
         height=200,
         logarithmic=bool((before > 0).all() and (after > 0).all()),
     )
+    counts = np.array([float(len(each.effects)) for each in learned])
+    found = Panel(
+        "effects [–]",
+        (Curve("effects found", counts, "purple", "steps"),),
+        span=(0.0, max(1.0, 1.25 * float(counts.max()))),
+        height=90,
+    )
     precision = Panel(
         "torque std [σ]",
         (Curve("torque deviation", known, "green", "joined"),),
-        height=150,
+        height=110,
     )
+    panels = (errors, found, precision) if np.isfinite(known).any() else (errors, found)
     return Plot(
         "Rounds",
         f"Held-out error on the newest motion: {before[-1]:.2f} % of the torque with the declared "
         f"model, {after[-1]:.2f} % with all effects found, after {len(done)} rounds.",
         "round",
         numbers,
-        (errors, precision) if np.isfinite(known).any() else (errors,),
-        caption="Errors are those on the newest motion of each round, which is held out; torque "
-        "std: predicted-torque standard deviation at random states, in σ of one sample.",
+        panels,
+        caption=f"{_new_effects(done)} Errors are those on the newest motion of each round, which "
+        "is held out; torque std: predicted-torque standard deviation at random states, in σ of "
+        "one sample.",
         wide=True,
+        span=(0.75, numbers[-1] + 0.25),
         counted=True,
     )
+
+
+def _new_effects(done: Sequence[CampaignRound]) -> str:
+    """`Round 1: spring on elbow. Round 2: nothing new.`"""
+    said, before = [], set[str]()
+    for each in done:
+        now = set(each.learned.effects) if each.learned else set()
+        new = [name for name in each.learned.effects if name not in before] if each.learned else []
+        gone = sorted(before - now)
+        words = ", ".join([*(f"+ {name}" for name in new), *(f"− {name}" for name in gone)])
+        said.append(f"Round {each.number}: {words or 'no change'}.")
+        before = now
+    return " ".join(said)
 
 
 def _open(last: CampaignRound) -> Section:
@@ -166,21 +229,32 @@ def _open(last: CampaignRound) -> Section:
     return Section("open", "What is open", lines)
 
 
-def _motions(campaign: Campaign) -> Section:
+def _motions(campaign: Campaign, files: Mapping[str, str]) -> Section:
+    """Every motion, and links to what is in the folder."""
     rows = (
         {
-            "motion": each.name,
+            "motion": f"{each.name}.csv",
+            "plan": each.plan,
             "for": each.purpose,
             "pace": f"{each.pace:.0%}",
             "seconds": f"{each.seconds:.1f}" if each.data else "",
-            "log": each.data or "not measured yet",
+            "log": each.data,
             "rejected recordings": "; ".join(each.rejected),
         }
         for one in campaign.rounds
         for each in one.motions
     )
-    table = Table.of("", rows, left=("motion", "for", "log"), words=("rejected recordings",))
-    return Section("motions", "Motions", (table,))
+    links = ("motion", "plan", "log")
+    played = Table.of(
+        "Motions (without a log: not measured yet)",
+        rows,
+        left=(*links, "for"),
+        words=("rejected recordings",),
+        files=links,
+    )
+    columns = ("what", "file")
+    beside = Table("Results", columns, tuple(files.items()), left=columns, files=("file",))
+    return Section("motions", "Motions and files", (played, beside) if files else (played,))
 
 
 show(

@@ -21,8 +21,14 @@ from excite_cli.diagnosis.words import (
     value_in_words,
 )
 from excite_cli.fields import data_of, public_data
-from excite_cli.report.residual_chart import dependence_plots, residuals_in_time
+from excite_cli.report.residual_chart import (
+    IN_TIME,
+    dependence_plots,
+    noise_by_joint,
+    residuals_in_time,
+)
 from excite_cli.report.validity_chart import validity_section
+from excite_cli.robot.model import Robot
 from excite_cli.shown.answer import (
     Answer,
     Block,
@@ -30,7 +36,6 @@ from excite_cli.shown.answer import (
     Command,
     Detail,
     Fold,
-    KeyFigure,
     Parts,
     Section,
     Table,
@@ -50,6 +55,7 @@ from excite_cli.summary.named_effects import (
     other_names,
     what_and_where,
 )
+from excite_cli.summary.status import purpose
 
 _WORTH = 0.01  # share of the residual from which on a quantity is told
 _MOST_QUANTITIES = 18
@@ -86,47 +92,15 @@ def diagnosis_parts(found: Diagnosis, detail: Detail = Detail.BRIEF) -> Parts:
     return [answer_in_words(found), *parts_of(sections)]
 
 
-def diagnosis_sections(found: Diagnosis, detail: Detail = Detail.PAGE) -> list[Section]:
-    """Those that have something to say, in the order of a page."""
-    every = [make(found, detail) for make in SECTIONS]
+def diagnosis_sections(
+    found: Diagnosis, detail: Detail = Detail.PAGE, robot: Robot | None = None
+) -> list[Section]:
+    """Those that have something to say, in the order of a page, which shows the `robot`."""
+    every = [
+        errors_section(found, detail, robot) if make is errors_section else make(found, detail)
+        for make in SECTIONS
+    ]
     return [section for section in every if section.blocks]
-
-
-def diagnosis_figures(found: Diagnosis) -> tuple[KeyFigure, ...]:
-    """What sums a diagnosis up."""
-    low, high = found.after.interval
-    kinds = list(dict.fromkeys(each.effect.kind for each in found.named))
-    listed = ", ".join(kinds[:3]) + (" …" if len(kinds) > 3 else "")
-    open_questions = sum(bool(each.aliases) for each in found.effects)
-    warned = [each for each in found.findings if each.severity == "warning"]
-    warnings = ", ".join(dict.fromkeys(each.kind.replace("_", " ") for each in warned))
-    bad = KeyFigure("verdict", "the held-out error did not fall", no_gain_in_words(found))
-    return (
-        *([] if found.good else [bad]),
-        KeyFigure(
-            "error on held-out data, moving",
-            f"{found.before.mean_relative_moving:.2%} → {found.after.mean_relative_moving:.2%}",
-            f"all samples {found.after.mean_relative:.2%}, 95% interval {low:.2%} to {high:.2%}",
-        ),
-        KeyFigure("effects found", str(len(found.named)), listed or _none(found)),
-        KeyFigure(
-            "not distinguished",
-            str(open_questions),
-            "effects with indistinguishable alternatives"
-            if open_questions
-            else "every effect is unique",
-        ),
-        KeyFigure(
-            "unexplained",
-            counted(len(found.joints_with_residual), "joint"),
-            ", ".join(found.joints_with_residual) or "the residual behaves like noise",
-        ),
-        KeyFigure(
-            "about the data",
-            counted(len(warned), "warning"),
-            f"{warnings}: see Data and choices" if warned else "taken as recorded",
-        ),
-    )
 
 
 def _none(found: Diagnosis) -> str:
@@ -137,10 +111,11 @@ def _time_section(found: Diagnosis, detail: Detail) -> Section:
     blocks: tuple[Block, ...] = ()
     if detail == Detail.PAGE and found.traces is not None:
         traces = (*found.held_out_traces, *found.traces.runs)
-        blocks = residuals_in_time(traces, found.joint_names, found.torque_units)
+        noise = noise_by_joint(found)
+        blocks = residuals_in_time(traces, found.joint_names, found.torque_units, noise)
     lead = (
-        "Filtered torque, as used in the fit. Above: measured torque and prediction of the model "
-        "with all effects; below: residuals of this and of the declared model. Shaded: held out."
+        f"{IN_TIME} of the model with all effects and of the declared one, over the noise. Shaded: "
+        "held out."
     )
     return Section("diagnosis-time", "Residual in time", blocks, lead)
 
@@ -221,7 +196,8 @@ def _candidates_section(found: Diagnosis, detail: Detail) -> Section:
         "is by how much the error on runs left out falls. One that is refused now may be accepted "
         "in a later round."
     )
-    return Section("diagnosis-candidates", "Rejected candidates, with reasons", blocks, lead)
+    title = "Rejected candidates, with reasons"
+    return Section("diagnosis-candidates", title, blocks, lead, on_paper=False)
 
 
 def _round_table(found: Diagnosis, each: Round) -> Table:
@@ -250,7 +226,7 @@ def _round_table(found: Diagnosis, each: Round) -> Table:
 def _next_section(found: Diagnosis, detail: Detail) -> Section:
     """On a page; an answer has the names of files to say it with."""
     experiment = next_experiment(found)
-    lead = f"Next: plan a motion, to {_purpose(experiment)}."
+    lead = f"Next: plan a motion, to {purpose(experiment['purpose'], len(experiment['pairs']))}."
     if detail < Detail.PAGE:
         return Section("diagnosis-next", "Next motion", (), lead)
     rows = tuple(
@@ -263,22 +239,17 @@ def _next_section(found: Diagnosis, detail: Detail) -> Section:
     return Section("diagnosis-next", "Next motion", (*table, command), lead)
 
 
-def _purpose(experiment: Mapping[str, Any]) -> str:
-    if experiment["purpose"] == "separate":
-        return f"distinguish {counted(len(experiment['pairs']), 'pair')} of effects"
-    return "excite the model with what was found"
-
-
 def _data_section(found: Diagnosis, detail: Detail) -> Section:
     blocks: list[Block] = []
     if detail == Detail.VERBOSE:
         blocks.append(_data_in_words(found))
     if detail == Detail.PAGE:
         blocks += data_blocks(found, found.joint_names, _runs(found))
-        blocks.append(f"{found.seconds:.1f} s.")
+    runs = ", ".join(map(str, found.processing.get("runs", ())))
     lead = (
-        "To go on with the extended model, `excite diagnose … --apply NEW.yaml` writes this "
-        "configuration with the effects that were found."
+        f"Made by `excite diagnose` in {found.seconds:.1f} s, fitted to {runs or 'the data'}, held "
+        f"out: {found.held_out_run}. To go on with the extended model, `excite diagnose … --apply "
+        "NEW.yaml` writes this configuration with the effects that were found."
     )
     return Section("diagnosis-data", "Data and choices", tuple(blocks), lead)
 
@@ -347,7 +318,10 @@ def _next(found: Diagnosis, experiment: dict[str, Any], config: str, file: str |
         return ["Next: repeat with -o DIAGNOSIS.h5, for a report and for the next motion."]
     if found.complete:
         return ["Next, with other data:", Command(("excite", "score", as_word(file), "DATA.h5"))]
-    return [f"Next: plan a motion, to {_purpose(experiment)}:", next_command(config, file)]
+    return [
+        f"Next: plan a motion, to {purpose(experiment['purpose'], len(experiment['pairs']))}:",
+        next_command(config, file),
+    ]
 
 
 def _in_words(found: Diagnosis) -> str:

@@ -34,7 +34,7 @@ def evidence_section(found: Diagnosis, detail: Detail) -> Section:
         "medians lie about zero. Samples in which the joint stands or reverses are left "
         "out, as in the fit."
     )
-    return Section("diagnosis-evidence", "Evidence", blocks, lead)
+    return Section("diagnosis-evidence", "Evidence", blocks, lead, on_paper=False)
 
 
 def _cards(found: Diagnosis) -> tuple[Block, ...]:

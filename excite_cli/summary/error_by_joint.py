@@ -10,9 +10,11 @@ from excite_cli.identification.fit_words import above_the_floor
 from excite_cli.report.chart import Chart
 from excite_cli.report.error_chart import DECLARED_AND_FOUND, NOTHING_MOVES, error_charts
 from excite_cli.report.posture_chart import robot_chart
+from excite_cli.robot.model import Robot
 from excite_cli.shown.answer import Block, Charts, Detail, Section, Table
 from excite_cli.summary.cells import figure, percent
 from excite_cli.summary.named_effects import what_and_where
+from excite_cli.summary.robot_shape import faces_of
 
 _OFF = "change by effect (pp)"
 _NAMED, _WORTH = 3, 0.1  # parts that are named in a row, and the least share of the fall
@@ -21,9 +23,12 @@ _SEEN = 0.005  # share of the first error below which a part is one of the other
 _LINES = ("URDF untouched", "declared model, refitted", "with effects")
 
 
-def errors_section(found: Diagnosis, detail: Detail) -> Section:
-    """Tables and what they come to; on a page also where the residual is, and both errors."""
-    blocks: list[Block] = list(_charts(found)) if detail == Detail.PAGE else []
+def errors_section(found: Diagnosis, detail: Detail, robot: Robot | None = None) -> Section:
+    """Tables and what they come to; on a page also where the residual is, and both errors.
+
+    With the `robot` it is drawn from its meshes.
+    """
+    blocks: list[Block] = list(_charts(found, robot)) if detail == Detail.PAGE else []
     blocks += error_tables(found, detail)
     above = above_the_floor(found.after, found.noise_floor)
     blocks += [above] if above else []
@@ -46,7 +51,7 @@ def _verdict(found: Diagnosis) -> str:
     )
 
 
-def _charts(found: Diagnosis) -> Iterator[Block]:
+def _charts(found: Diagnosis, robot: Robot | None) -> Iterator[Block]:
     charts: tuple[Chart, ...] = error_charts(
         DECLARED_AND_FOUND,
         (found.before, found.after),
@@ -57,7 +62,9 @@ def _charts(found: Diagnosis) -> Iterator[Block]:
         what = "Residual relative error where the joint moves, on held-out data"
         shares = found.after.relative_moving
         title = "Where the residual is"
-        charts = (robot_chart(title, found.skeleton, found.joint_names, shares, what), *charts)
+        faces = None if robot is None else faces_of(robot)
+        drawn = robot_chart(title, found.skeleton, found.joint_names, shares, what, faces)
+        charts = (drawn, *charts)
     yield Charts(charts)
     if all(isnan(each) for each in found.after.relative_moving.values()):
         yield NOTHING_MOVES

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from excite_cli.diagnosis.words import counted
 from excite_cli.fields import data_of
 from excite_cli.identification.carried_load import LoadIdentification
 from excite_cli.identification.fit import Fit
@@ -22,7 +23,7 @@ from excite_cli.identification.identify import Identification
 from excite_cli.identification.link_changes import LinkChange
 from excite_cli.identification.stored_model import StoredFit
 from excite_cli.report.error_chart import NOTHING_MOVES, error_charts, parameter_charts
-from excite_cli.report.residual_chart import residuals_in_time
+from excite_cli.report.residual_chart import IN_TIME, residuals_in_time
 from excite_cli.report.validity_chart import validity_section
 from excite_cli.shown.answer import (
     Answer,
@@ -47,6 +48,7 @@ from excite_cli.summary.findings import data_blocks
 from excite_cli.summary.frames import OF_FIT, OF_IDENTIFICATION, parameters_of
 
 _CORRELATED, _MOST_PAIRS = 0.95, 15
+_OVERFITTED = 2.0  # times the training error that the held-out one is
 
 # What a fit changed of the links, as a table, a line on the others, and as data.
 
@@ -61,13 +63,13 @@ def link_parts(links: Sequence[LinkChange]) -> Parts:
         return []
     shown = [link for link in links if link.significant or link.marks]
     others = len(links) - len(shown)
-    counted = (
+    unchanged = (
         f"{others} {'other ' if shown else ''}link{'s' * (others != 1)} of {len(links)}: mass and "
         "centre within two standard deviations of the URDF's."
     )
     left = ("link", "determined by data")
     table = Table.of(_TITLE, map(_row, shown), left, words=("physically infeasible",))
-    return [*([table] if shown else []), *([counted] if others else [])]
+    return [*([table] if shown else []), *([unchanged] if others else [])]
 
 
 def link_data(links: Sequence[LinkChange]) -> list[dict[str, Any]]:
@@ -251,22 +253,44 @@ def fit_figures(stored: StoredFit) -> tuple[KeyFigure, ...]:
     fit, error = stored.fit, stored.error
     low, high = error.interval
     fixed = int(np.sum(fit.identifiable))
+    known = {j: each for j, each in error.relative_moving.items() if not isnan(each)}
+    worst = max(known, key=lambda joint: known[joint], default="")
+    said = f"worst joint: {worst} {known[worst]:.2%}\n" if known else ""
+    overfitted = error.mean_relative > _OVERFITTED * stored.training_error.mean_relative
+    warned = sum(each.severity == "warning" for each in stored.findings)
+    data = f"{counted(warned, 'warning')} about the data"
     return (
         KeyFigure(
             "error on held-out data, moving",
             f"{error.mean_relative_moving:.2%}",
-            f"all samples {error.mean_relative:.2%}, 95% interval {low:.2%} to {high:.2%}",
+            f"{said}all samples {error.mean_relative:.2%}, 95% interval {low:.2%} to {high:.2%}",
+            "open" if overfitted else "good",
+            "fit-errors",
         ),
         KeyFigure(
             "identifiable parameters",
             f"{fixed} of {len(fit.names)}",
             f"{fit.rank} base parameters, {len(fit.names) - fit.rank} of effects",
+            "good" if fixed == len(fit.names) else "open",
+            "fit-parameters",
         ),
         KeyFigure(
             "effective sample size",
             f"{fit.samples:.0f}",
-            f"of {fit.count} samples, which are correlated in time",
+            f"of {fit.count} samples, which are correlated in time\n{data}",
+            "open" if warned else "good",
+            "fit-data",
         ),
+    )
+
+
+def fit_in_a_sentence(stored: StoredFit) -> str:
+    """What its page says first."""
+    fixed, count = int(np.sum(stored.fit.identifiable)), len(stored.fit.names)
+    return (
+        f"The model misses {relative_in_words(stored.error.mean_relative_moving)} of the torque on "
+        f"{stored.held_out_run}, which took no part in the fit (mean over joints, where they "
+        f"move). {fixed} of {count} parameters are identifiable."
     )
 
 
@@ -275,6 +299,7 @@ def fit_sections(stored: StoredFit) -> list[Section]:
     fit, units = stored.fit, stored.torque_units
     # What took no part comes first: it is the judge.
     traces = sorted(stored.traces, key=lambda trace: not trace.held_out)
+    noise = stored.noise_floor or dict(zip(fit.joint_names, map(float, fit.noise), strict=True))
     return [
         Section(
             "fit-errors",
@@ -286,9 +311,8 @@ def fit_sections(stored: StoredFit) -> list[Section]:
         Section(
             "fit-time",
             "Fit in time",
-            residuals_in_time(traces, fit.joint_names, units),
-            "Filtered torque, as used in the fit. Above: measured torque and prediction of the "
-            "model; below: residual. Shaded: held out from the fit.",
+            residuals_in_time(traces, fit.joint_names, units, noise),
+            f"{IN_TIME}, over the noise. Shaded: held out from the fit.",
         ),
         *_validity(stored),
         Section(
@@ -298,7 +322,8 @@ def fit_sections(stored: StoredFit) -> list[Section]:
                 f"{stored.closed_loop_bias[:1].upper()}{stored.closed_loop_bias[1:]}.",
                 *data_blocks(stored, fit.joint_names),
             ),
-            f"From {', '.join(stored.sources)}.",
+            f"Made by `excite identify` from {', '.join(stored.sources)}, held out: "
+            f"{stored.held_out_run}.",
         ),
     ]
 

@@ -210,7 +210,10 @@ def inspection_page(found: AnyInspection, title: str) -> Page:
     return Page(
         title,
         "Log and model: set-up checks",
-        (KeyFigure("faults", str(faults)), KeyFigure("doubts", str(doubts))),
+        (
+            KeyFigure("faults", str(faults), verdict="bad" if faults else "good"),
+            KeyFigure("doubts", str(doubts), verdict="open" if doubts else "good"),
+        ),
         tuple(section for section in sections if section.blocks),
         (Text(headline(found), "good" if found.good else "bad"),),
     )

@@ -85,6 +85,7 @@ _LACKING = (
     "the last column: verdict on held-out data, error of the most affected joint without it)"
 )
 _MOST_ABSORBED = 6  # rows that a page shows without being opened
+_MOST_SURROGATES = 4
 _SURROGATES = "Surrogate terms (they approximate an effect that has no name)"
 
 
@@ -204,7 +205,10 @@ def approximation_parts(found: Diagnosis, detail: Detail) -> Parts:
     own, everything = set() if detail else friction_rows(found)[1], len(found.joint_names)
     every = [each for each in found.approximations if not _is_part(each, own)]
     shown = [each for each in every if detail or each.verdict is HeldOutVerdict.CONFIRMED]
-    parts: Parts = [effect_table(shown, everything, detail, _SURROGATES)] if shown else []
+    parts: Parts = []
+    if shown:
+        table = effect_table(shown, everything, detail, _SURROGATES)
+        parts.append(replace(table, folded=len(shown) > _MOST_SURROGATES))
     if others := [each for each in every if each not in shown]:
         listed = "; ".join(
             what_and_where(each.effect, everything)

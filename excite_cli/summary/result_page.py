@@ -1,5 +1,7 @@
 """The page of planned motions: condition numbers, motions, margins, and how they were made."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from excite_cli.diagnosis.words import counted
@@ -22,6 +24,7 @@ from excite_cli.shown.answer import (
     Section,
     Table,
     Text,
+    Verdict,
 )
 from excite_cli.summary.motions import margin_table, motion_table, pairs_of_numbers_table
 from excite_cli.summary.pairs import (
@@ -77,7 +80,7 @@ def result_figures(result: Result, problem: Problem) -> list[KeyFigure]:
     prior = ", on earlier data" if result.priors else ""
     for_work = result.motions[-1].predicted_deviation is not None
     name = "predicted torques, in noise of a sample" if for_work else "condition number"
-    found = [KeyFigure(name, in_figures(last), f"after {count}{prior}")]
+    found = [KeyFigure(name, in_figures(last), f"after {count}{prior}", anchor="condition")]
     if result.random:
         random = _figure(result.random[-1])
         worse = f"{in_figures(random / last)} times worse"
@@ -85,10 +88,19 @@ def result_figures(result: Result, problem: Problem) -> list[KeyFigure]:
     seconds = in_figures(sum(motion.seconds for motion in result.motions))
     duration = in_figures(problem.trajectory.duration)
     motions = f"{len(result.motions)} × {duration} s"
-    found.append(KeyFigure("motions", motions, f"found in {seconds} s"))
-    (value, remark), _ = _kept(result)
-    kept = [KeyFigure("constraints", value, remark)] if problem.constraints else []
-    return [*found, *kept]
+    found.append(KeyFigure("motions", motions, f"found in {seconds} s", anchor="motions"))
+    (value, remark), words = _kept(result)
+    verdicts: dict[str, Verdict] = {"good": "good", "bad": "bad"}
+    verdict = verdicts.get(words.kind, "open")
+    kept = KeyFigure("constraints", value, remark, verdict, "margins")
+    return [*found, *([kept] if problem.constraints else [])]
+
+
+def result_answer(result: Result) -> Text:
+    """What the page of motions says first."""
+    words = _kept(result)[1]
+    kind = "bad" if words.kind == "bad" else "answer"
+    return Text(f"{condition_words(result)} {words.text}", kind)
 
 
 def _figure(motion: Motion | RandomMotion) -> float:
@@ -262,6 +274,11 @@ def origin_section(result: Result, problem: Problem, file: str) -> Section:
     blocks: list[Block] = [
         Table("This result", columns, (("file", file), *_origin(result, problem)), left=columns),
         Fold("The config, with all defaults (YAML)", (Text(result.config, "code"),)),
+        *(
+            [Fold("Columns of effects", (", ".join(names),))]
+            if (names := result.effect_names)
+            else []
+        ),
         Table("Versions", versions, rows, left=versions, folded=True),
     ]
     if result.checked_pairs:
@@ -279,6 +296,7 @@ def origin_section(result: Result, problem: Problem, file: str) -> Section:
     if left_out := problem.extension.left_out:
         blocks.append(f"Effects that the regressor leaves out: {'; '.join(left_out)}.")
     lead = (
+        "Made by `excite optimize`. "
         f"Minimised: {problem.spec.criterion.kind.replace('_', ' ')} of {problem.columns} columns, "
         f"{problem.variables} coefficients per motion, {len(problem.constraints)} kinds of "
         "constraints. The same config, seed and versions give the same numbers."
@@ -297,9 +315,15 @@ def _origin(result: Result, problem: Problem) -> tuple[tuple[str, str], ...]:
         ("robot hash", result.fingerprint),
         ("measured rows", str(len(robot.rows))),
         ("base parameters", str(problem.base.rank)),
-        ("columns of effects", ", ".join(result.effect_names) or "none"),
+        ("columns of effects", _kinds(result.effect_names)),
         ("trajectory", f"{problem.spec.trajectory.family}, {in_figures(trajectory.duration)} s"),
         ("seed", str(result.seed)),
         ("earlier data", ", ".join(result.priors) or "none"),
         ("computation time", f"{seconds:.1f} s, {counted(evaluations, 'evaluation')}"),
     )
+
+
+def _kinds(names: Sequence[str]) -> str:
+    """`12: viscous_friction, ripple` of columns as `ripple[elbow].sin`."""
+    kinds = dict.fromkeys(name.partition("[")[0] for name in names)
+    return f"{len(names)}: {', '.join(kinds)}" if names else "none"

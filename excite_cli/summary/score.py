@@ -82,6 +82,7 @@ def score_figures(score: Score) -> tuple[KeyFigure, ...]:
             "runs beyond the model's tolerance",
             f"{len(score.alarms)} of {len(score.runs)}",
             "tolerance: residual of the model on its own data, in proportion to the torque",
+            "bad" if score.alarms else "good",
         ),
     )
 

@@ -6,7 +6,7 @@ import pytest
 
 from excite_cli.errors import MissingExtraError
 from excite_cli.report.chart import Chart
-from excite_cli.report.page import render
+from excite_cli.report.page import _asset, render
 from excite_cli.report.rows_chart import Axis, Bar, Mark, Row, rows_chart
 from excite_cli.shown.answer import (
     Charts,
@@ -132,3 +132,57 @@ def test_equal_results_give_equal_pages(case: Case, report: str) -> None:
     problem, result = case
     source = Source("smoke", "smoke.h5", result, problem)
     assert render(page_of([source], lambda name, done: None)) == report
+
+
+def test_names_of_files_beside_the_page_are_links() -> None:
+    table = Table("", ("log", "plan", "n"), (("a b.csv", EVIL, "1"),), files=("log", "plan"))
+    text = render(Page("t", "s", (), (Section("a", "A", (table,)),)))
+    assert '<a href="a%20b.csv">a b.csv</a>' in text
+    links = [a["href"] for a in Structure(text).all("a") if not a["href"].startswith("#")]
+    assert len(links) == 2
+    assert not any(sign in link for link in links for sign in "<>\"'& ")
+
+
+def test_what_is_not_for_paper_is_named_there() -> None:
+    sections = (Section("a", "First", ("1",)), Section("b", "Second", ("2",), on_paper=False))
+    text = render(Page("t", "s", (), sections))
+    assert '<section id="b" class="unprinted"' in text
+    assert '<section id="a" aria' in text
+    assert "Not printed: Second, folded parts." in text
+
+
+def test_a_verdict_is_a_class_and_a_figure_leads_to_its_section() -> None:
+    figure = KeyFigure("error", "1 %", "small\nand sure", "good", "a")
+    text = render(Page("t", "s", (figure, KeyFigure("n", "2")), (Section("a", "A", ("1",)),)))
+    assert '<div class="good"><dt><a href="#a">error</a></dt>' in text
+    assert "small<br>and sure" in text
+    assert '<div class="plain"><dt>n</dt>' in text
+
+
+def _luminance(colour: str) -> float:
+    parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    linear = [x / 12.92 if x <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4 for x in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+@pytest.mark.parametrize("theme", ["light", "dark", "print"])
+def test_texts_and_lines_have_the_contrast_of_aa(theme: str) -> None:
+    """Texts 4.5 : 1 and signs 3 : 1 against every ground that they stand on."""
+    style = _asset("page.css")
+    begin = {"light": ":root {", "dark": ':root[data-theme="dark"] {', "print": "@media print {"}
+    rules = style[style.index(begin[theme]) :].partition("}")[0]
+    colours = {name: _whole(value) for name, value in re.findall(r"--(\w+): (#\w+)", rules)}
+    ink = ("ink", "muted", "accent") if theme != "print" else ("ink", "muted")
+    signs = ("blue", "vermilion", "green", "amber", "purple", "limit")
+    for names, least, grounds in (
+        (ink, 4.5, ("paper", "card", "shaded")),
+        (signs, 3.0, ("paper", "card", "shaded", "forbidden")),
+    ):
+        for name in names:
+            for ground in grounds:
+                high, low = sorted((_luminance(colours[name]), _luminance(colours[ground])))[::-1]
+                assert (high + 0.05) / (low + 0.05) >= least, f"{name} on {ground}"
+
+
+def _whole(colour: str) -> str:
+    return colour if len(colour) == 7 else "#" + "".join(2 * digit for digit in colour[1:])

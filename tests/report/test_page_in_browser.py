@@ -178,10 +178,13 @@ def test_values_are_read_under_the_pointer(page: Any) -> None:
     page.mouse.move(0, 0)
 
 
-def test_on_paper_every_motion_is_printed_and_no_button(page: Any) -> None:
+def test_on_paper_the_chosen_motion_is_printed_and_no_button(page: Any) -> None:
     page.emulate_media(media="print")
-    assert all(option.is_visible() for option in page.locator(".option").all())
+    for choice in page.locator(".choice").all():
+        first, second = choice.locator(":scope > .option").all()
+        assert (first.is_visible(), second.is_visible()) == (True, False)
     assert not page.locator("#theme").is_visible()
     assert not page.locator("nav").is_visible()
-    for plot in page.locator(".plot").all():
+    for plot in page.locator(".option:not([hidden]) .plot").all():
+        plot.locator("canvas").first.wait_for(state="attached")
         assert plot.locator("canvas").count() == 2 or plot.locator("canvas").count() == 1

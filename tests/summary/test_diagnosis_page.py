@@ -13,6 +13,7 @@ from excite_cli.diagnosis.records import (
     ConfoundedCandidate,
     Diagnosis,
     EffectRecord,
+    ExcessResidual,
     JointAlias,
     NamedEffect,
 )
@@ -23,7 +24,7 @@ from excite_cli.report.chart import Chart
 from excite_cli.report.effect_chart import Cloud, law_line
 from excite_cli.report.page import render
 from excite_cli.report.plot import Plot
-from excite_cli.report.residual_chart import residuals_in_time
+from excite_cli.report.residual_chart import noise_by_joint, residuals_in_time
 from excite_cli.shown.answer import (
     Block,
     Charts,
@@ -38,10 +39,10 @@ from excite_cli.shown.answer import (
 )
 from excite_cli.summary.assembly import Source, page_of
 from excite_cli.summary.diagnosis import (
-    diagnosis_figures,
     diagnosis_parts,
     diagnosis_sections,
 )
+from excite_cli.summary.status import diagnosis_figures
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis, make_traces
 from tests.report.structure import Structure
 
@@ -175,13 +176,39 @@ def test_evidence_tells_of_pairs(diagnosis: Diagnosis, beside: tuple[str, ...], 
     assert captions[1] == captions[2]
 
 
-def test_residuals_tell_held_out_from_training(sections: dict[str, Section]) -> None:
+def test_residuals_tell_held_out_from_training(
+    sections: dict[str, Section], diagnosis: Diagnosis
+) -> None:
     (choice,) = sections["diagnosis-time"].blocks
     assert isinstance(choice, Choice)
     labels = [label for label, _ in choice.options]
     assert labels == ["run_3 (held out: took no part in the fit)", "run_1"]
     elbow = next(c for c in charts_of(sections["diagnosis-time"]) if c.title == "elbow")
     assert "the declared model without the effects found" in elbow.alternative
+    assert isinstance(elbow, Plot)
+    upper, lower = elbow.panels
+    assert [(each.label, each.look) for each in upper.series] == [
+        ("measured", "band"),  # behind
+        ("model", "line"),
+    ]
+    measured, model = (each.y for each in upper.series)
+    left, spread = np.sqrt(np.nanmean((measured - model) ** 2)), np.nanstd(measured)
+    assert upper.corner == f"fit {100 * (1 - left / spread):.3g} %"
+    assert lower.noise == pytest.approx(2.0 * noise_by_joint(diagnosis)["elbow"])
+
+
+def test_the_noise_is_a_band_of_the_residual(diagnosis: Diagnosis) -> None:
+    joints = diagnosis.joint_names
+    levels = [0.25] * len(joints)
+    known = replace(diagnosis, processing={**diagnosis.processing, "noise_rms": levels})
+    chart = charts_of(section_of(known, "time"))[0]
+    assert isinstance(chart, Plot)
+    shown = chart.panels[1].noise
+    assert shown == pytest.approx(0.5 if chart.panels[1].axis == "residual [N·m]" else 500.0)
+    assert noise_by_joint(replace(known, excess_residuals=())) == dict.fromkeys(joints, 0.25)
+    told = ExcessResidual(joints[1], 1.0, 0.1, 0.02, "band", True, 0.0, ())
+    floor = replace(known, noise_floor=dict.fromkeys(joints, 1.0), excess_residuals=(told,))
+    assert noise_by_joint(floor) == dict.fromkeys(joints, 1.0) | {joints[1]: 0.02}
 
 
 def test_held_out_blocks_of_a_run_are_shaded(diagnosis: Diagnosis) -> None:
@@ -268,9 +295,10 @@ def test_the_page_has_every_table_and_sentence_of_the_terminal(diagnosis: Diagno
 def test_warnings_are_counted_on_top(diagnosis: Diagnosis) -> None:
     said = [Finding("lag", "warning", "late"), Finding("jitter", "note", "a bit")]
     warned = diagnosis_figures(replace(diagnosis, findings=tuple(said)))[-1]
-    assert (warned.value, warned.remark) == ("1 warning", "lag: see Data and choices")
+    assert "1 warning about the data (lag): see Data and choices" in warned.remark
+    assert warned.verdict == "open"
     calm = diagnosis_figures(replace(diagnosis, findings=()))[-1]
-    assert (calm.value, calm.remark) == ("0 warnings", "taken as recorded")
+    assert "0 warnings about the data: taken as recorded" in calm.remark
 
 
 def test_every_run_is_listed_with_its_use_and_what_is_there_alone(diagnosis: Diagnosis) -> None:

@@ -3,7 +3,7 @@
 (() => {
   const style = getComputedStyle(document.documentElement);
   const colour = (name) => style.getPropertyValue("--" + name).trim();
-  const figures = (value) => value === null || value === undefined ? "–" : !value ? "0" : Math.abs(value) >= 1e5 || Math.abs(value) < 1e-3
+  const figures = (value) => value === null || value === undefined ? "" : !value ? "0" : Math.abs(value) >= 1e5 || Math.abs(value) < 1e-3
     ? value.toExponential(2) : String(Number(value.toPrecision(4)));
   const decoded = (told) => {
     const bytes = Uint8Array.from(atob(told.d), (letter) => letter.charCodeAt(0));
@@ -14,6 +14,7 @@
     }
     return values;
   };
+  const ticks = (_, splits) => splits.map((value) => Math.abs(value) >= 1e5 || (value && Math.abs(value) < 1e-3) ? Number(value.toPrecision(3)).toExponential().replace("e+", "e") : figures(value));
   const powers = (values) => values.map((value) => value == null ? value : 10 ** value);
   // Ticks of a logarithmic axis: powers of ten, with 2 and 5 between them on few decades, or even
   // steps within less than one.
@@ -39,8 +40,9 @@
     return groups.get(link);
   };
   const DASHES = { dashed: [5, 3], dotted: [2, 2] };
-  const FONT = '12px system-ui, "Segoe UI", Roboto, "Helvetica Neue", "DejaVu Sans", sans-serif';
+  const FONT = 'system-ui, "Segoe UI", Roboto, "Helvetica Neue", "DejaVu Sans", sans-serif';
   let paper = false;
+  const font = (size) => (paper ? 0.75 * size : size) + "px " + FONT;
 
   // The sample of a series that is nearest to the cursor and known.
   const nearest = (plot, series, index) => {
@@ -63,8 +65,14 @@
     ctx.beginPath();
     ctx.rect(left, top, bbox.width, bbox.height);
     ctx.clip();
-    ctx.fillStyle = colour("forbidden");
+    ctx.fillStyle = colour("shaded");
     for (const [from, to] of told.shaded) ctx.fillRect(at(from, "x"), top, at(to, "x") - at(from, "x"), bbox.height);
+    ctx.fillStyle = colour("forbidden");
+    if (panel.noise) {
+      ctx.fillStyle = colour("shaded");
+      ctx.fillRect(left, at(panel.noise, "y"), bbox.width, at(-panel.noise, "y") - at(panel.noise, "y"));
+      ctx.fillStyle = colour("forbidden");
+    }
     const [low, high] = panel.limits;
     if (low !== null) ctx.fillRect(left, at(low, "y"), bbox.width, bottom - at(low, "y"));
     if (high !== null) ctx.fillRect(left, top, bbox.width, at(high, "y") - top);
@@ -100,18 +108,36 @@
     }
   };
 
+  // A figure in the corner, on paper of its own.
+  const corner = (text) => (plot) => {
+    if (!text) return;
+    const { ctx, bbox } = plot, size = devicePixelRatio, right = bbox.left + bbox.width - 4 * size;
+    ctx.save();
+    ctx.font = font(11.5 * size);
+    ctx.textAlign = "right";
+    ctx.textBaseline = "top";
+    const wide = ctx.measureText(text).width;
+    ctx.globalAlpha = 0.85;
+    ctx.fillStyle = colour("card");
+    ctx.fillRect(right - wide - 3 * size, bbox.top, wide + 7 * size, 17 * size);
+    ctx.globalAlpha = 1;
+    ctx.fillStyle = colour("ink");
+    ctx.fillText(text, right, bbox.top + 3 * size);
+    ctx.restore();
+  };
+
   const seriesOf = (one) => {
     const rings = one.look === "rings", dots = rings || one.look === "dots" || one.look === "marks";
     const pen = () => colour(one.colour);
     return {
       label: one.label,
       stroke: pen,
-      width: one.look === "dotted" ? 1.2 : 1.5,
+      width: one.look === "band" ? 6 : one.look === "dotted" ? 1.2 : 1.4,
       dash: DASHES[one.look],
-      paths: dots ? () => null : undefined,
-      points: { show: dots || one.look === "joined", size: one.look === "dots" ? 3.5 : one.look === "marks" ? 6.5 : rings ? 9 : 5, fill: rings ? () => colour("card") : pen, stroke: pen, width: rings ? 1.5 : 0 },
-      alpha: one.look === "dots" ? 0.6 : 1,
-      value: (_, value) => figures(value),
+      paths: dots ? () => null : one.look === "steps" ? uPlot.paths.stepped({ align: 1 }) : undefined,
+      points: { show: dots || one.look === "joined" || one.look === "steps", size: one.look === "dots" ? 3.5 : one.look === "marks" ? 6.5 : rings ? 9 : 5, fill: rings ? () => colour("card") : pen, stroke: pen, width: rings ? 1.5 : 0 },
+      alpha: one.look === "band" ? 0.4 : one.look === "dots" ? 0.6 : 1,
+      value: (_, value) => value == null ? "" : figures(Number(value.toPrecision(3))),
     };
   };
 
@@ -130,25 +156,27 @@
     holder.plots = told.panels.map((panel, number) => {
       const last = number === told.panels.length - 1;
       const { data, ends } = holder.numbers[number];
-      const axis = { stroke: () => colour("ink"), grid: { stroke: () => colour("grid"), width: 1 }, ticks: { stroke: () => colour("grid"), width: 1, size: 5 }, font: FONT, labelFont: FONT, values: (_, splits) => splits.map(figures) };
+      const axis = { stroke: () => colour("ink"), grid: { stroke: () => colour("grid"), width: 1 }, ticks: { stroke: () => colour("grid"), width: 1, size: 5 }, font: font(12), labelFont: font(12), values: ticks };
+      const across = { space: told.counted ? 30 : 44, ...(told.counted ? { incrs: WHOLE } : {}) };
       const shown = () => told.span || [data[0][0], data[0][data[0].length - 1]];
       let telling = false;
       const plot = new uPlot({
         width: holder.clientWidth,
         class: last ? "lowest" : "upper",
-        height: panel.height + (last ? 34 : 0),
+        title: panel.axis,
+        height: (paper ? 0.7 : 1) * panel.height + (last ? 34 : 0),
         padding: [8, 8, 0, 0],
         cursor: { sync: { key, setSeries: false, scales: ["x", null], filters: { pub: (type) => type === "mousemove" || type === "mouseleave" } }, drag: { x: true, y: false, setScale: true }, dataIdx: nearest, points: { size: 6 } },
         legend: { live: true, markers: { width: 2 } },
         scales: { x: { time: false, range: (_, low, high) => low === null ? shown() : [low, high] }, y: panel.span ? { range: panel.span } : panel.logarithmic ? { distr: 3, range: (_, low, high) => low === null ? [1, 10] : [low * 0.85, high * 1.18] } : {} },
         axes: [
-          last ? { ...axis, label: told.axis, labelSize: 20, size: 32, gap: 2, space: told.counted ? 30 : 60, ...(told.counted ? { incrs: WHOLE } : {}) } : { ...axis, show: true, size: 4, values: () => [], space: 60 },
-          { ...axis, label: panel.axis, labelSize: 18, size: 50, gap: 3, space: 34, ...(panel.logarithmic ? { splits: decades, filter: (_, splits) => splits } : {}) },
+          last ? { ...axis, ...across, label: told.axis, labelSize: 20, size: 32, gap: 2 } : { ...axis, ...across, size: 4, values: () => [] },
+          { ...axis, size: paper ? 34 : 46, gap: 3, space: 34, ...(panel.logarithmic ? { splits: decades, filter: (_, splits) => splits } : {}) },
         ],
         series: [{ label: told.axis.replace(/\s*\[.*$/, ""), value: (_, value) => figures(value) }, ...panel.series.map(seriesOf)],
         hooks: {
           drawClear: [ground(told, panel)],
-          draw: [whiskers(ends)],
+          draw: [whiskers(ends), corner(panel.corner)],
           setScale: [(own, name) => {
             if (name !== "x" || telling || own.busy) return;
             const { min, max } = own.scales.x, [low, high] = shown();
@@ -159,6 +187,8 @@
           }],
         },
       }, data, holder);
+      plot.root.insertBefore(plot.root.querySelector(".u-legend"), plot.root.querySelector(".u-wrap"));
+      plot.root.querySelectorAll(".u-series").forEach((row, k) => row.classList.add(k ? panel.series[k - 1].look : "over"));
       plot.busy = true;
       const [min, max] = group.range || shown();
       plot.setScale("x", { min, max });
@@ -220,7 +250,7 @@
     paper = true;
     for (const holder of holders) {
       remove(holder);
-      Object.defineProperty(holder, "clientWidth", { value: holder.closest(".wide") ? 660 : 320, configurable: true });
+      Object.defineProperty(holder, "clientWidth", { value: holder.closest(".wide") ? 680 : 218, configurable: true });
       build(holder);
     }
   };
