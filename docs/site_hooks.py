@@ -8,6 +8,8 @@ from latex2mathml.converter import convert
 
 # What pymdownx.arithmatex leaves of $…$ and $$…$$.
 _INLINE = re.compile(r'<span class="arithmatex">\\\((.*?)\\\)</span>', re.DOTALL)
+# A wide formula is scrolled by keyboard, too.
+_FORMULA = '<div class="formula" tabindex="0" role="group" aria-label="Formula">{}</div>'
 _BLOCK = re.compile(r'<div class="arithmatex">\s*\\\[(.*?)\\\]\s*</div>', re.DOTALL)
 # A thin space after log, min …, which browsers leave out; none before a bracket.
 _NAMED = re.compile(r"(<mi>(?:log|min|max|sin|cos|tr|diag|cond|det)</mi>)(?!\s*<mo)")
@@ -27,9 +29,7 @@ def on_page_markdown(markdown: str, page: Any, **_: object) -> str:
 
 def on_page_content(content: str, **_: object) -> str:
     """The page's HTML with every formula as MathML; called by MkDocs."""
-    content = _BLOCK.sub(
-        lambda found: f'<div class="formula" tabindex="0" role="group" aria-label="Formula">{_mathml(found, "block")}</div>', content
-    )
+    content = _BLOCK.sub(lambda found: _FORMULA.format(_mathml(found, "block")), content)
     return _INLINE.sub(lambda found: _mathml(found, "inline"), content)
 
 
