@@ -141,6 +141,8 @@ def _by_noise(
     p, total = factors[0].shape[-1] - 1, int(count.sum())
     freedom = np.maximum(count - p * count / max(total, 1), 1.0)  # less its share of parameters
     sigma = AT_FIRST / EXACT * floor
+    if method == "ols":  # all joints alike
+        sigma = np.full_like(sigma, sigma.max())
     solution = solve(stacked(factors, sigma, extra[:0] if method == "ols" else extra))
     if method == "ols" and not len(extra):
         return sigma, solution

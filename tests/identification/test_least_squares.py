@@ -34,6 +34,16 @@ def test_weighting_by_noise_beats_equal_weights() -> None:
     assert fits[0].noise == pytest.approx(noise, rel=0.15)
 
 
+def test_without_weights_all_joints_count_alike() -> None:
+    """Also where the torque of one is a hundred times that of the other."""
+    rows = random_rows(0, np.array([1.0, 1.0]), 50, dropped=0.0)
+    scale = np.array([1.0, 100.0])
+    rows = RunRows(rows.columns * scale[:, None], rows.tau * scale, rows.usable)
+    plain = np.linalg.lstsq(rows.columns.reshape(-1, 4), rows.tau.ravel(), rcond=None)[0]
+    assert fit_rows([rows], "ols").x == pytest.approx(plain, rel=1e-9)
+    assert fit_rows([rows], "wls").x != pytest.approx(plain, rel=1e-3)
+
+
 def test_outliers_hardly_move_the_robust_fit() -> None:
     rows = random_rows(3, np.array([1.0, 1.0]), 600)
     bad = np.random.default_rng(0).random(rows.tau.shape) < 0.05
