@@ -43,7 +43,8 @@ _DEVIATIONS = 2.0
 def with_everyday(traced: SearchResult, chosen: Sequence[int]) -> list[int]:
     """The chosen ones with the friction and rotors of the textbook, those that do not matter away.
 
-    None that the chosen ones have among their columns, or exclude.
+    None that the chosen ones exclude. What the data do not tell from them, offsets as well, is
+    beside them where it is in the textbook's model: together they have what that gives them.
     """
     judge, candidates = traced.judge, traced.candidates
     taken = {candidates[i].place for i in chosen}
