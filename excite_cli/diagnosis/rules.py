@@ -22,7 +22,9 @@ ON_FEWER_ROWS = 25.0
 
 # What would add more than this share of all torque seen of its joint to the textbook's model along
 # a usual motion, where the data say less of it than what is imagined, is not known from these data
-# (`extrapolation`).
+# (`extrapolation`). Of 19 robots of the battery the geometric mean is 0.81 times the textbook's
+# error so, 1.05 where whole torques were compared; Med 7 19.4 and 24.8 %. The share is that of the
+# rule before: with 0.3 in its place it forbade three harmful effects and four helpful ones.
 MUCH = 0.5
 
 # What has less than this share of its energy in the seconds that are fitted is unknown there: it is
