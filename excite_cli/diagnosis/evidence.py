@@ -75,7 +75,7 @@ class Grams:
 _THERE = 1e-5  # of a column's energy: of less in a fold, it is not there
 _BY_WEIGHT = 4.0  # times what the data leave: the deviation is half of theirs, or less
 _NEXT_TO_NOTHING = 1e-6  # of a prior's precision
-_KEPT = 6  # projections that are kept: a step of a search asks for the same few again
+_KEPT = 6  # of each that is kept: a step of a search asks for the same few again
 
 
 class Evidence:
@@ -109,8 +109,8 @@ class Evidence:
         self._energies: dict[tuple[int, ...], float] = {}
         self._factors: dict[tuple[int, ...], Cholesky] = {}
         self._inverses: dict[tuple[int, ...], Array] = {}  # of the last model
-        self._schurs: dict[tuple[int, ...], Schur] = {}
-        self._whole: tuple[int, ...] = ()
+        self._wholes: dict[tuple[int, ...], Schur] = {}
+        self._projections: dict[tuple[int, ...], Schur] = {}
         self._candidates = CandidateBases(self.total, fixed, self.blocks)
         self._weighed, self._otherwise_known = weighed, prior - weighed
 
@@ -167,7 +167,7 @@ class Evidence:
 
     def energy(self, chosen: Sequence[int]) -> float:
         """Residual energy (with the prior's, if any) of the model with the chosen candidates."""
-        key = tuple(chosen)
+        key = tuple(sorted(chosen))
         if key not in self._energies:
             rhs = self.total[self.columns(key), self.torque]
             explained = rhs @ self.factor(key).solve(rhs)
@@ -179,21 +179,21 @@ class Evidence:
 
         Where that of a model with one member more is known, it is a projection away.
         """
-        key = tuple(chosen)
-        if key not in self._schurs:
+        key = tuple(sorted(chosen))
+        if key in self._wholes:
+            return self._wholes[key]
+        if key not in self._projections:
             more = None if self._weighed.any() else self._with_one_more(key)
             if more is None:
-                found, self._whole = self._schur(key), key
-            else:
-                found = self._projected(key, more)
-            keep(self._schurs, key, found, _KEPT)
-        return self._schurs[key]
+                keep(self._wholes, key, self._schur(key), _KEPT)
+                return self._wholes[key]
+            keep(self._projections, key, self._projected(key, more), _KEPT)
+        return self._projections[key]
 
     def _with_one_more(self, chosen: tuple[int, ...]) -> tuple[int, ...] | None:
-        """The last model that was solved, if it has one member more."""
-        key = self._whole
-        has_it = any(chosen == key[:k] + key[k + 1 :] for k in range(len(key)))
-        return key if has_it and key in self._schurs else None
+        """A model that was solved and has one member more."""
+        one_more = (key for key in self._wholes if len(key) == len(chosen) + 1)
+        return next((key for key in one_more if set(chosen) < set(key)), None)
 
     def _projected(self, rest: tuple[int, ...], key: tuple[int, ...]) -> Schur:
         """That of the model `key` without the one member that is not in `rest`.
@@ -207,8 +207,8 @@ class Evidence:
         values = (self.solve(key) * self.norms[self.columns(key)])[own]
         if rest not in self._energies:
             self._energies[rest] = self.energy(key) + float(values @ inverse @ values)
-        whole = self._schurs.pop(key)
-        self._schurs[key] = whole  # the next to be asked for lacks another member
+        whole = self._wholes.pop(key)
+        self._wholes[key] = whole  # the next to be asked for lacks another member
         return whole.without(own, inverse, values)
 
     def gain_of(self, member: int, chosen: Sequence[int]) -> Gain:
@@ -216,7 +216,7 @@ class Evidence:
 
         Its block of the inverse is the inverse of what the others leave of it.
         """
-        key = tuple(chosen)
+        key = tuple(sorted(chosen))
         own = self._own_columns(member, key)
         left = np.asarray(np.linalg.inv(self._inverse(key)[own, own]))
         values = (self.solve(key) * self.norms[self.columns(key)])[own]

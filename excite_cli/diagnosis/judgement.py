@@ -173,7 +173,7 @@ class Judgement:
             for parent in (*self.parents[i], *self._within[i]):
                 if self.candidates[parent].place in there:
                     continue
-                gain = schur.singles[parent]
+                gain = schur.gain(parent)
                 if (
                     gain.chi2 > self.price(parent, gain.dof)
                     and self.verdict(chosen, [parent]) is Verdict.ACCEPTED

@@ -6,7 +6,7 @@ model has taken its part, z = G_cy − G_cS N⁻¹ G_Sy its product with the res
 energy that it explains: χ² distributed for unit noise if the candidate is not there.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -74,6 +74,7 @@ class CandidateBases:
     def __init__(self, total: Array, fixed: int, blocks: list[Indices]) -> None:
         self.total, self.fixed, self.blocks = total, fixed, blocks
         self._bases: dict[int, Array] = {}
+        self._of_one_shape: dict[tuple[int, ...], list[OneShape]] = {}
 
     def basis(self, candidates: Sequence[int]) -> Array:
         """Orthonormal directions (p, d) of candidates' columns, without collinear ones."""
@@ -83,11 +84,16 @@ class CandidateBases:
             self._bases[candidates[0]] = self._basis(self.blocks[candidates[0]])
         return self._bases[candidates[0]]
 
-    @cached_property
-    def of_one_shape(self) -> list[OneShape]:
-        """All candidates."""
+    def of_one_shape(self, some: Iterable[int]) -> list[OneShape]:
+        """Some of the candidates; of the same ones they are made once."""
+        key = tuple(some)
+        if key not in self._of_one_shape:
+            self._of_one_shape[key] = self._sorted_by_shape(key)
+        return self._of_one_shape[key]
+
+    def _sorted_by_shape(self, some: Sequence[int]) -> list[OneShape]:
         shapes: dict[tuple[int, ...], list[int]] = {}
-        for i in range(len(self.blocks)):
+        for i in some:
             shapes.setdefault(self.basis([i]).shape, []).append(i)
         found = []
         for several in shapes.values():
@@ -161,10 +167,14 @@ class Schur:
         return gain_of_columns(self.block(at, at), self.cross[at], e.basis(candidates), absorbed)
 
     @cached_property
-    def singles(self) -> list[Gain]:
+    def singles(self) -> dict[int, Gain]:
         """Gain of every candidate alone."""
+        return self.singles_of(range(len(self._candidates.blocks)))
+
+    def singles_of(self, some: Iterable[int]) -> dict[int, Gain]:
+        """Gain of some candidates alone."""
         found: dict[int, Gain] = {}
-        for alike in self._candidates.of_one_shape:
+        for alike in self._candidates.of_one_shape(some):
             at = alike.columns - self._candidates.fixed
             shared, solved = (np.moveaxis(x[:, at], 0, 2) for x in (self._shared, self._solved))
             left = alike.grams - shared @ np.swapaxes(solved, 1, 2)
@@ -172,7 +182,7 @@ class Schur:
             absorbed = np.where(told, SHARED, ABSORBED)
             gains = _gains(left, self.cross[at], alike.bases, absorbed)
             found |= dict(zip(alike.candidates, gains, strict=True))
-        return [found[i] for i in range(len(found))]
+        return found
 
     def pair_chi2(self, first: Array, second: Array) -> Array:
         """χ² of pairs of candidates of one column each, without those that are collinear."""

@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 
 from excite_cli.diagnosis.judgement import Judgement
-from excite_cli.diagnosis.schur import Schur
+from excite_cli.diagnosis.schur import Gain, Schur
 from excite_cli.diagnosis.verdict import Verdict
 from excite_cli.effects.base import Place, Tier
 
@@ -160,7 +160,8 @@ class CandidateSearch:
     def _best_two(self, chosen: list[int], latest: Tier) -> tuple[int, ...]:
         """Two of one joint at once, where none passes alone."""
         schur = self.white.schur(chosen)
-        ranked = sorted(self._pairs(schur, self._free(chosen, latest)), key=lambda found: -found[0])
+        pairs = self._pairs(schur, schur.singles, self._free(chosen, latest))
+        ranked = sorted(pairs, key=lambda found: -found[0])
         for saved, pair in ranked[:_TRIED]:
             if saved <= 0:
                 break
@@ -171,13 +172,18 @@ class CandidateSearch:
                 return pair
         return ()
 
-    def _pairs(self, schur: Schur, free: Sequence[int]) -> list[tuple[float, tuple[int, int]]]:
-        """What promising pairs of local candidates of one joint, of different kinds, save."""
+    def _pairs(
+        self, schur: Schur, alone: Mapping[int, Gain], free: Sequence[int]
+    ) -> list[tuple[float, tuple[int, int]]]:
+        """What promising pairs of local candidates of one joint, of different kinds, save.
+
+        `alone`: what each of them adds alone.
+        """
         found = []
         local = [i for i in free if i in self._local]
         for rows in {self.candidates[i].rows for i in local}:
-            own = [i for i in local if self.candidates[i].rows == rows and schur.singles[i].dof]
-            own.sort(key=lambda i: -schur.singles[i].chi2)
+            own = [i for i in local if self.candidates[i].rows == rows and alone[i].dof]
+            own.sort(key=lambda i: -alone[i].chi2)
             own = own[:_PAIRED]
             pairs = [
                 (a, b) for k, a in enumerate(own) for b in own[k + 1 :] if self.judge.together(a, b)
@@ -257,15 +263,16 @@ class CandidateSearch:
         base = energy + self.judge.prices(rest)
         if base < best:
             best, found = base, ()
+        alone = schur.singles_of(self._near(i))
         near = self._free(rest, among=self._near(i))
         moves: list[tuple[float, tuple[int, ...]]] = []
         gains: dict[tuple[int, ...], float] = {}
         for k in near:
-            gain = schur.singles[k]
+            gain = alone[k]
             if k != i and gain.dof:
                 moves.append((gain.chi2 - self.judge.price(k, gain.dof), (k,)))
                 gains[(k,)] = gain.chi2
-        for saved, pair in self._pairs(schur, near):
+        for saved, pair in self._pairs(schur, alone, near):
             moves.append((saved, pair))
             gains[pair] = saved + self.judge.price(pair[0], 1) + self.judge.price(pair[1], 1)
         for saved, move in sorted(moves, key=lambda each: -each[0])[:_TRIED]:

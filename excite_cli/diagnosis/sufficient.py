@@ -3,7 +3,8 @@
 What the search named leaves, where it acts on several joints and is missed on one of them at most,
 unless the model with all of that predicts new recordings better (`comparison`). Of this, with the
 friction and rotors of the textbook beside it, and the textbook's model the one with fewer
-parameters is the answer, unless the other predicts better by 2 % of the error.
+parameters is the answer, unless the other predicts better: by 2 % of the error, what was found;
+surely, the textbook's model, which claims nothing.
 
 What single runs carry describes these recordings, and no new one is the better predicted for it
 (pushes, and a load of two runs in three, were left out of the answer so). It stays if seconds
@@ -62,7 +63,10 @@ def with_everyday(traced: SearchResult, chosen: Sequence[int]) -> list[int]:
 
 
 def those_that_matter(traced: SearchResult, chosen: Sequence[int]) -> list[int]:
-    """Without those of the textbook's that surely do not matter, or whose size cannot be."""
+    """Without those of the textbook's that surely do not matter, or whose size cannot be.
+
+    An offset may have any size: of what is missing beside it (a spring), it makes up the mean.
+    """
     judge, found = traced.judge, list(chosen)
     elsewhere = _Elsewhere(traced, found)
     common = set(everyday(traced.candidates))
@@ -71,12 +75,15 @@ def those_that_matter(traced: SearchResult, chosen: Sequence[int]) -> list[int]:
         there = judge.p_value(i, judge.white.gain_of(i, found)) <= judge.rules.significance
         return rules.SMALLEST if there else rules.MATTERS
 
+    def any_size(i: int) -> bool:
+        return traced.candidates[i].effect.data_defect
+
     while True:
         theta, shares = traced.fitted(found), elsewhere.shares(found)
         leaving = {
             i: shares[i]
             for i in common.intersection(found)
-            if not (shares[i] > least(i) and judge.allowed(theta, found, [i]))
+            if not (shares[i] > least(i) and (any_size(i) or judge.allowed(theta, found, [i])))
         }
         if not leaving:
             return found
@@ -143,7 +150,8 @@ def sufficient(traced: SearchResult, models: ModelComparison) -> list[int]:
         (plain, found), key=lambda some: sum(traced.candidates[i].width for i in some)
     )
     gained = models.difference(best, larger)
-    if gained.better and gained.of_error > np.log(rules.AS_GOOD):
+    least = 0.0 if larger is plain else np.log(rules.AS_GOOD)
+    if gained.better and gained.of_error > least:
         best = larger
     return those_that_matter(traced, best)
 

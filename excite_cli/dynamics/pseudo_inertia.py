@@ -6,7 +6,7 @@ J is linear in the ten standard parameters. Its rows are scaled by the body's le
 it is in kg: D J D with D = diag(1/ℓ, 1/ℓ, 1/ℓ, 1), a congruence, keeps the sign of eigenvalues.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.sparse import csc_matrix, eye
 
 from excite_cli.dynamics.base_parameters import BaseParameters
+from excite_cli.robot.link_frame import leaves
 from excite_cli.robot.model import Array, Robot
 
 _INERTIA_AT = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # Ixx Ixy Iyy Ixz Iyz Izz
@@ -222,6 +223,7 @@ def _triangle_vectors(matrices: Array) -> Array:
 _MASS_SHARE, _MOMENT_FLOOR, _INERTIA_FLOOR = 0.1, 0.2, 0.1
 _MEDIAN = 0.6745  # of |z|, z normal
 _AS_USUAL = 1.05
+_ACTS = 0.1  # of a base parameter's deviation: a body that says less of it does not act on it
 # Standard deviation of the URDF's inertial parameters, as a share, where nobody says it: over real
 # and simulated robots 0.3 is best or next to it (docs/decisions/prior-of-inertial-parameters.md).
 UNSURE = 0.3
@@ -229,20 +231,39 @@ UNSURE = 0.3
 
 @dataclass(frozen=True)
 class InertialPrior:
-    """`mean` (P,), `std` (P,) of independent standard parameters [kg, kg m, kg m²]."""
+    """`mean` (P,), `std` (P,) of independent standard parameters [kg, kg m, kg m²].
+
+    `ends`: bodies that carry no other.
+    """
 
     mean: Array
     std: Array
+    ends: tuple[int, ...] = ()
 
     def widened(self, base: BaseParameters, values: Array) -> "InertialPrior":
         """The same, as wide as the usual one of its differences from `values` (r,) of a fit.
 
         Masses of a placeholder are off by many times their size, all of them. A model that lacks
-        something is far off in a few directions, and the median does not know these.
+        something is far off in a few directions, and the median does not know these. The last
+        bodies have a width of their own, since any of them may hold a tool: the RMS of the
+        differences in the directions [whitened] in which the body's own parameters act.
         """
         whiten, target = self.on_base(base)
-        usual = float(np.median(np.abs(whiten @ values - target))) / _MEDIAN
-        return self if usual <= _AS_USUAL else InertialPrior(self.mean, usual * self.std)
+        off = whiten @ values - target
+        usual = max(float(np.median(np.abs(off))) / _MEDIAN, 1.0)
+        std = usual * self.std
+        for end in self.ends:
+            own = slice(10 * end, 10 * end + 10)
+            axes, sizes, _ = np.linalg.svd(whiten @ (base.mapping[:, own] * self.std[own]))
+            there = axes[:, : len(sizes)][:, sizes > _ACTS]
+            std[own] *= (
+                max(float(np.sqrt(np.mean((there.T @ off) ** 2))) / usual, 1.0)
+                if there.size
+                else 1.0
+            )
+        if (std <= _AS_USUAL * self.std).all():
+            return self
+        return replace(self, std=std)
 
     def base_std(self, base: BaseParameters) -> Array:
         """Standard deviations (r,) of base parameters."""
@@ -279,7 +300,7 @@ def inertial_prior(robot: Robot, phi_cad: Array, uncertainty: float) -> Inertial
     floors[:, 1:4] = (_MOMENT_FLOOR * mass * length)[:, None]
     floors[:, 4:] = (_INERTIA_FLOOR * mass * length**2)[:, None]
     scale = np.maximum(np.abs(bodies), floors)
-    return InertialPrior(bodies.ravel().copy(), uncertainty * scale.ravel())
+    return InertialPrior(bodies.ravel().copy(), uncertainty * scale.ravel(), tuple(leaves(robot)))
 
 
 def _regular(covariance: Array) -> Array:

@@ -95,6 +95,41 @@ def test_what_single_runs_carry_stays_beside_the_textbook_if_its_own_seconds_mis
     assert sufficient_.sufficient(traced, models) == answer
 
 
+@pytest.mark.parametrize(("plain_is_larger", "answer"), [(True, [0, 1]), (False, [0])])
+def test_of_models_that_differ_by_less_than_two_per_cent(
+    monkeypatch: pytest.MonkeyPatch, plain_is_larger: bool, answer: list[int]
+) -> None:
+    """The textbook's claims nothing: it stays where it is surely better. Names must be worth it."""
+    monkeypatch.setattr(sufficient_, "with_everyday", lambda traced, some: list(some))
+    monkeypatch.setattr(sufficient_, "those_that_matter", lambda traced, some: list(some))
+    effects = [kind("coulomb_friction"), kind("torque_offset")]
+    one, both = (0,), (0, 1)
+    traced: Any = SimpleNamespace(
+        plain=both if plain_is_larger else one,
+        chosen=one if plain_is_larger else both,
+        judge=None,
+        candidates=[SimpleNamespace(effect=each, rows=(0,), width=1) for each in effects],
+    )
+
+    def difference(one: list[int], other: list[int]) -> SimpleNamespace:
+        return SimpleNamespace(better=len(other) > len(one), of_error=0.01)
+
+    models: Any = SimpleNamespace(difference=difference, missed=None)
+    assert sufficient_.sufficient(traced, models) == answer
+
+
+def test_an_offset_may_have_any_size() -> None:
+    """11 kN·m of it made up for a spring that nobody named: without, all of the mean was left."""
+    seen = crept(FAST)
+    both = [kind("coulomb_friction"), kind("torque_offset")]
+    given = found_with(seen, both, noisy(seen, 0.0, 0.1) + 100.0, 0.1)
+    assert those_that_matter(given, [0, 1]) == [0, 1]
+    other = found_with(
+        seen, [*both, kind("viscous_friction")], given.data.tau[0] - 50 * seen.v, 1.0
+    )
+    assert 2 not in those_that_matter(other, [0, 1, 2])  # friction may not
+
+
 @pytest.mark.parametrize(
     ("kinds", "offset", "viscous", "level", "joins"),
     [

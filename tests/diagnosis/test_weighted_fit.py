@@ -133,6 +133,28 @@ def test_what_the_data_hardly_show_is_the_textbooks() -> None:
     assert np.abs(near).max() < 0.02 * np.abs(free).max()
 
 
+def test_what_is_imagined_takes_nothing_from_the_data() -> None:
+    """What was found is in the data for sure, and the textbook's model has nothing of it."""
+    data, candidates = random_data(1), random_candidates(1)
+    found = [each[:, 0] @ [40.0, -40.0] for each in candidates[2].columns]
+    tau = [t + np.column_stack([x, 0.0 * x]) for t, x in zip(data.tau, found, strict=True)]
+    data, chosen, plain = _with(data, tuple(tau)), [1, 2, 3], (0, 1)
+    free, left = WeightedFit(data, candidates)(chosen)
+    columns = 100.0 * usual_motion(1)
+    usual = np.einsum("tjp,tjq->jpq", columns, columns) / len(columns)
+    fit = WeightedFit(data, candidates, usual, plain)
+    assert 0.0 < fit._fitted(chosen, np.zeros(0), None)[0] < 1.0
+    parameters, now = fit(chosen)
+    assert (now <= rules.AS_GOOD * left).all()
+    assert parameters[-3:-1] == pytest.approx([40.0, -40.0], rel=0.05)
+    rows = fit_rows(data.rows(candidates, chosen), "wls", fit.imagined(chosen)).x
+    assert rows == pytest.approx(parameters, rel=1e-6, abs=1e-9)
+    # Where nothing can be imagined without harm, nothing is.
+    alone = WeightedFit(data, candidates, 1e12 * usual, plain)
+    assert alone(chosen)[0] == pytest.approx(free, rel=1e-12)
+    assert len(alone.imagined(chosen)[0]) == 0
+
+
 def _with(
     data: TrainingData, tau: tuple[Array, ...], declared: tuple[Array, ...] | None = None
 ) -> TrainingData:

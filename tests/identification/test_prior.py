@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from excite_cli.config.data_spec import IdentificationSpec
+from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.pseudo_inertia import inertial_prior
 from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.identification.prior import prior_of
+from excite_cli.robot.model import build_robot
 from tests.robot.random_robots import random_robot
 
 ROBOT = random_robot(2, joints=4)
@@ -61,6 +63,28 @@ def test_a_placeholder_is_worth_what_the_fit_says(factor: float) -> None:
     off = truth.copy()
     off[0] += 1e9  # what one parameter takes up says nothing of the others
     assert np.median(prior.widened(BASE, off).std / wide.std) == pytest.approx(1.0, rel=0.5)
+
+
+@pytest.mark.parametrize(
+    ("body", "times", "wide"), [(5, 20.0, True), (5, 1.3, False), (2, 1.3, False)]
+)
+def test_a_tool_that_is_not_in_the_urdf_widens_the_last_body(
+    body: int, times: float, wide: bool
+) -> None:
+    """3.5 kg on a wrist of 0.2 kg: nobody knows it, and the rest is as the URDF has it."""
+    robot = build_robot(RobotSpec(urdf="example-robot-data:ur10"))
+    base, cad = find_base_parameters(robot), standard_parameters(robot)
+    prior = inertial_prior(robot, cad, 0.3)
+    assert prior.ends == (5,)
+    truth = cad.copy()
+    truth[10 * body : 10 * body + 10] *= times
+    found = prior.widened(base, base.mapping @ truth)
+    if not wide:
+        assert found is prior
+        return
+    wider = found.std / prior.std
+    assert (wider[50:] > 15.0).all()
+    assert (wider[:50] < 3.0).all()
 
 
 def test_what_the_urdf_is_worth() -> None:
