@@ -5,7 +5,6 @@ from the start. What no mistake explains is left to the diagnosis.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -47,7 +46,7 @@ def _look(
     robot: Robot, runs: Sequence[Run], prepared: Sequence[PreparedRun], spec: Spec
 ) -> list[CheckResult]:
     clocked = any(run.dq is not None for run in runs)
-    samples = replace(samples_of(prepared, _SAMPLES, clocked), turns=~robot.sliding)
+    samples = samples_of(prepared, _SAMPLES, clocked, robot.sliding)
     if spec.measurement.trust is True or not len(samples.q):
         why = "measurement.trust is set" if len(samples.q) else "no joint moves for long enough"
         text = f"mount, zeros, signs, order, units and clock are not judged: {why}"

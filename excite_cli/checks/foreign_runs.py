@@ -35,7 +35,7 @@ def foreign_runs(
     the `cure`, is one with which all runs fit: of a wrong one some show more than others.
     """
     recordings = _recordings(runs)
-    fits = {name: TextbookFit(robot, samples_of(each, _SAMPLES))
+    fits = {name: TextbookFit(robot, samples_of(each, _SAMPLES, sliding=robot.sliding))
             for name, each in recordings.items()}  # fmt: skip
     setup = Setup.as_declared(robot)
     foreign = _foreign(fits, setup)
@@ -102,7 +102,9 @@ def _owner(
     best, least = "", _BELONGS * own.left
     for other, motion in recordings.items():
         if other != name and len(motion) == len(torques) == 1:
-            joined = samples_of([_with_torque(motion[0], torques[0])], _SAMPLES)
+            joined = samples_of(
+                [_with_torque(motion[0], torques[0])], _SAMPLES, sliding=robot.sliding
+            )
             found = TextbookFit(robot, joined)(setup)
             if found.judged.any() and found.left < least:
                 best, least = other, found.left

@@ -17,10 +17,14 @@ explained by bodies that nobody built. At the minimum L = Σ_j log s_j + ½ ‖z
 Set-ups are compared by L: the one with which the same model explains far more is the truth.
 
 Instants in which a joint stands or reverses do not count: what it then carries is up to its
-friction.
+friction. Friction that follows a change of direction late looks like torques that are late. Where
+the two are compared, X has directions b that follow that of the motion over some way, too
+(`with_late_friction`).
 """
 
+from copy import copy
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -41,7 +45,6 @@ _LIGHTEST = -1.5
 FLOOR = 0.02  # shares below this are noise and effects: no difference is made there
 _ROUNDS, _SETTLED = 6, 0.02  # of the weights; in log
 _FIRST = 0.3  # s_j to begin with
-_PASSIVE, _SIGNED = 5, 4  # columns of X; those whose coefficients must not be negative
 _ROUNDING = 1e-13
 _STATES, _SEEN = 40, 1e-9  # states; share of the largest singular value from which one counts
 _RIDGE = 1e-9  # of a column of X, whose norm is 1
@@ -52,7 +55,7 @@ class TextbookShares:
     """`shares` (n,) of the torques that are left, 1 where not `judged` (n,); `loss` L.
 
     `z` (r + 1,): by how many standard deviations bodies, and all torques, are others than the URDF
-    says; `passive` (n, 5): coefficients c of X.
+    says; `passive` (n, k): coefficients c of X.
     """
 
     shares: Array
@@ -87,12 +90,19 @@ class TextbookFit:
         spread = inertial_prior(robot, self.phi, _UNCERTAIN).std.reshape(-1, 10).copy()
         own = _UNCERTAIN * self.phi.reshape(-1, 10)[:, 1:4]
         spread[:, 1:4] = np.hypot(own, _CENTER * spread[:, :1] / _UNCERTAIN)
-        self._scale = loose * _SCALE
+        self._scale, self._late = loose * _SCALE, False
         self._basis = loose * _seen(robot, self.phi, spread.ravel())
 
     def __call__(self, setup: Setup) -> TextbookShares:
         """How well the data fit, set up so."""
         return self._fitted(setup, self.columns(setup), self.phi, self._basis_of(setup))
+
+    @cached_property
+    def with_late_friction(self) -> "TextbookFit":
+        """The same model with friction that follows a change of direction late."""
+        other = copy(self)
+        other._late = True
+        return other
 
     def gravity(self, setup: Setup, z: Array | None = None) -> Array:
         """The direction (3,) of gravity that fits best beside the rest, at the bodies of `z`.
@@ -134,13 +144,13 @@ class TextbookFit:
 
         `nan` where either has none that count.
         """
-        (v, a, torque, whole), counted = self._rows(setup), self.counted(setup)
+        (v, a, torque, whole, bristles), counted = self._rows(setup), self.counted(setup)
         columns = self.columns(setup)
         load, known = columns @ self.bodies(setup, found.z), columns @ self.phi
         shares = np.full(len(found.shares), np.nan)
         for j in np.flatnonzero(found.judged & (counted.sum(axis=0) >= FEWEST)):
             at = counted[:, j]
-            passive = _passive(v[at, j], a[at, j], known[at, j])
+            passive = _passive(v[at, j], a[at, j], known[at, j], bristles[at, j])
             left = whole[at, j] - load[at, j] - passive @ found.passive[j]
             shares[j] = np.sqrt(np.mean(left**2)) / max(float(np.std(torque[at, j])), 1e-9)
         return shares
@@ -158,12 +168,13 @@ class TextbookFit:
             tools[10 * body : 10 * body + 10, 10 * k : 10 * k + 10] = np.diag(sizes)
         return np.hstack([self._basis, tools])
 
-    def _rows(self, setup: Setup) -> tuple[Array, Array, Array, Array]:
-        """v, a, the torque, and that with the weight which was taken off it, (T, n)."""
+    def _rows(self, setup: Setup) -> tuple[Array, Array, Array, Array, Array]:
+        """v, a, the torque, that with the weight which was taken off it, (T, n); b (T, n, 3)."""
         _, v, a = setup.motion(self.samples)
         torque = setup.torque(self.samples)
         whole = torque + self.weight(setup) @ setup.gravity if setup.weightless else torque
-        return v, a, torque, whole
+        bristles = setup.bristles(self.samples)[:, :, : None if self._late else 0]
+        return v, a, torque, whole, bristles
 
 
 def _seen(robot: Robot, phi: Array, spread: Array) -> Array:
@@ -179,10 +190,10 @@ def _seen(robot: Robot, phi: Array, spread: Array) -> Array:
     return np.asarray((directions[sizes > _SEEN * sizes[0]] * spread).T)
 
 
-def _passive(v: Array, a: Array, load: Array) -> Array:
-    """X (T, 5)."""
+def _passive(v: Array, a: Array, load: Array, bristles: Array) -> Array:
+    """X (T, 5 or 8)."""
     way = np.sign(v)
-    return np.column_stack([v, way, np.abs(load) * way, a, np.ones(len(v))])
+    return np.column_stack([v, way, np.abs(load) * way, a, bristles, np.ones(len(v))])
 
 
 def _explained(
@@ -197,20 +208,20 @@ def _explained(
     grams, scales = [], []
     for j in np.flatnonzero(judged):
         at = counted[:, j]
-        v, a, torque, whole = (x[at, j] for x in rows)
+        v, a, torque, whole, bristles = (x[at, j] for x in rows)
         size = float(np.sum(np.square(torque - torque.mean())))
         if not size > 0.0:
             judged[j] = False
             continue
         load = columns[at, j] @ phi
         uncertain = [columns[at, j] @ basis, scale * load]
-        passive = _passive(v, a, load)
+        passive = _passive(v, a, load, bristles)
         norms = np.linalg.norm(passive, axis=0)
         scales.append(np.sqrt(size) / np.where(norms > 0.0, norms, 1.0))
         block = np.column_stack([*uncertain, passive * scales[-1], whole - load])
         grams.append(block.T @ block / size)
     shares, z = np.ones(counted.shape[1]), np.zeros(basis.shape[1] + 1)
-    coefficients = np.zeros((len(shares), _PASSIVE))
+    coefficients = np.zeros((len(shares), passive.shape[1] if grams else 0))
     if not grams:
         return TextbookShares(shares, judged, 0.0, z, coefficients)
     products = _Products(np.array(grams), len(z))
@@ -226,7 +237,7 @@ def _explained(
 
 
 class _Products:
-    """Products (J, P + 6, P + 6) of the columns Y D, X and τ − Y φ of every judged joint.
+    """Products (J, P + 1 + k, P + 1 + k) of the columns Y D, X and τ − Y φ of every judged joint.
 
     Friction and rotors that would be negative leave for good.
     """
@@ -248,7 +259,7 @@ class _Products:
         self._rest = whole - np.swapaxes(cross, 1, 2) @ self._gain
 
     def solved(self, s: Array) -> tuple[Array, Array, Array]:
-        """z (P,), what is left of each joint (J,), and coefficients of X (J, 5)."""
+        """z (P,), what is left of each joint (J,), and coefficients of X (J, k)."""
         while True:
             total = np.tensordot(s**-2, self._rest, axes=1)
             inner = total[:-1, :-1]
@@ -261,9 +272,9 @@ class _Products:
                 z = np.append(np.linalg.solve(inner[:-1, :-1], side), _LIGHTEST)
             both: Array = np.append(-z, 1.0)
             follows = np.asarray(self._gain @ both)
-            negative = (follows[:, :_SIGNED] < 0.0) & (self._active[:, :_SIGNED] > 0.0)
+            negative = (follows[:, :-1] < 0.0) & (self._active[:, :-1] > 0.0)
             if not negative.any():
                 left = np.einsum("p,jpr,r->j", both, self._rest, both)
                 return z, np.asarray(np.sqrt(np.maximum(left, 0.0))), follows
-            self._active[:, :_SIGNED][negative] = 0.0
+            self._active[:, :-1][negative] = 0.0
             self._eliminate()

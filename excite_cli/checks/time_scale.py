@@ -17,6 +17,7 @@ from excite_cli.config.spec import Spec
 _CLOCKS = (0.25, 0.5, 0.7, 0.85, 0.93, 1.07, 1.18, 1.4, 2.0, 4.0)
 _FINE_CLOCK = (0.05, 0.025, 0.012, 0.006)  # in log
 _FINE_LAG = (0.005, 0.0025, 0.00125)  # s
+_CLEAR = 0.5  # of L, as all that is set up wrongly must gain
 _SMALLEST = 0.02  # s: shorter is a delay of the drive, left to the diagnosis
 
 
@@ -75,13 +76,16 @@ class TorqueLag(SetupCheck):
                 yield Alternative(replace(setup, lag=float(lag)))
 
     def refined(self, fit: TextbookFit, found: Alternative) -> Iterator[Alternative]:
-        """The lag that explains most."""
+        """The lag that explains most beside friction that is late itself, if any does."""
 
         def moved(setup: Setup, step: float) -> Setup:
             return replace(setup, lag=setup.lag + step)
 
-        setup, _ = descended(fit, found.setup, _FINE_LAG, moved)
-        if abs(setup.lag) >= _SMALLEST:
+        beside = fit.with_late_friction
+        losses = {lag: beside(replace(found.setup, lag=lag)).loss for lag in map(float, LAGS)}
+        nearest = replace(found.setup, lag=min(losses, key=losses.__getitem__))
+        setup, loss = descended(beside, nearest, _FINE_LAG, moved)
+        if abs(setup.lag) >= _SMALLEST and loss < beside(replace(setup, lag=0.0)).loss - _CLEAR:
             yield Alternative(setup)
 
     def sentence(self, names: Sequence[str], before: Setup, after: Setup) -> str:

@@ -233,7 +233,7 @@ class _Path:
         kept = np.exp(-side * length / distance)
         wear = (side + length * change) / distance
         first = smooth_sign(v[:1], _SLIDING)
-        state = _recursion(kept, np.concatenate([first, (1.0 - kept) * sign]))
+        state = recursion(kept, np.concatenate([first, (1.0 - kept) * sign]))
         start = float(smooth_sign_slope(v[:1], _SLIDING).sum())
         return cls(sign, slope, kept, wear, state, start, turning)
 
@@ -241,7 +241,7 @@ class _Path:
         """Derivatives of Σ weights ∘ z by q and v, (T,) each, for weights (T,) of the samples."""
         every = np.zeros(len(self.state))
         every[::2] = weights
-        later = _recursion(self.kept[::-1], every[::-1])[::-1]
+        later = recursion(self.kept[::-1], every[::-1])[::-1]
         by_length = (self.sign - self.state[:-1]) * self.kept * self.wear
         by_length = later[1:] * (by_length + (1.0 - self.kept) * self.slope)
         by_point = -np.diff(by_length, prepend=0.0, append=0.0)
@@ -276,7 +276,7 @@ def _with_turning_points(q: Array, v: Array, step: float) -> tuple[Array, Array]
     return points, np.stack(derivatives, axis=1)
 
 
-def _recursion(factors: Array, terms: Array) -> Array:
+def recursion(factors: Array, terms: Array) -> Array:
     """x (T,) of x_0 = terms_0, x_{k+1} = factors_k x_k + terms_{k+1}, by doubling."""
     x, factor = terms.copy(), np.concatenate([[0.0], factors])
     step = 1

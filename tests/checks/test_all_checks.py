@@ -271,7 +271,7 @@ def squatting(standing: bool) -> Samples:
         assert data.ncon >= 4
     q, v, a, tau = (np.array(x) for x in zip(*rows, strict=True))
     yes = np.ones(q.shape, bool)
-    return Samples(q, v, a, tau, tau[None], yes, yes)
+    return Samples(q, v, a, tau, np.sign(v)[:, :, None], tau[None], yes, yes)
 
 
 def test_legs_that_carry_are_told_from_legs_that_hang(robot: Robot) -> None:

@@ -86,6 +86,22 @@ def test_sound_data(sound: Dataset) -> None:
     assert all(each.kind != "clock" for each in found(coarse))
 
 
+@pytest.fixture(scope="module")
+def late_friction() -> Dataset:
+    """Friction that follows a change of direction over 5 mrad, as gears have it."""
+    sizes = [40.0, 40.0, 30.0, 8.0, 8.0, 6.0]
+    dry, follows = kind_named("coulomb_friction"), kind_named("dahl_friction")
+    rubs = [plant(dry, (j,), x) for j, x in enumerate(sizes)]
+    rubs += [plant(follows, (j,), x, {"distance": 0.005}) for j, x in enumerate(sizes)]
+    return played(ROBOT, *rubs, torque_noise=0.01, inertia_error=0.2).dataset
+
+
+def test_friction_that_comes_late_is_no_torque_that_does(late_friction: Dataset) -> None:
+    assert all(each.kind != "torque_lag" for each in found(late_friction))
+    (result,) = (x for x in found(changed(late_friction, late(0.05))) if x.kind == "torque_lag")
+    assert result.settings["measurement.torque_lag"] == pytest.approx(0.05, abs=0.01)
+
+
 @pytest.mark.parametrize(
     ("gravity", "turn"),
     [
@@ -250,7 +266,7 @@ def test_what_puts_a_joint_beyond_its_limits_is_not_tried(sound: Dataset) -> Non
 def resting(q: np.ndarray) -> Samples:
     none = np.zeros_like(q)
     every = np.ones(q.shape, bool)
-    return Samples(q, none, none, none, none[None], every, every)
+    return Samples(q, none, none, none, none[:, :, None], none[None], every, every)
 
 
 def test_beyond_by_a_tenth_of_the_range_but_for_whole_turns() -> None:
