@@ -11,8 +11,8 @@ from threading import Thread
 import pytest
 
 from excite_cli.campaign import command, supervised
-from excite_cli.campaign.command import MeasureCommand
 from excite_cli.campaign.measure import NotMeasuredError, StillRunningError
+from excite_cli.campaign.measure_command import MeasureCommand
 from excite_cli.campaign.process_table import running
 from excite_cli.campaign.same_motion import is_measured
 from excite_cli.campaign.supervised import left_in

@@ -33,7 +33,7 @@ from excite_cli.robot.overview import describe
 from excite_cli.robot.tree import skeleton_of
 from excite_cli.robot.urdf_joints import survey
 from excite_cli.shown.note import Level
-from excite_cli.summary.problem import problem_notes
+from excite_cli.summary.problem_notes import problem_notes
 from tests.proposal.robots import GOOD, joint, link, serial, written
 from tests.robot.coupled_robots import CLAW, HAND, coupled_robot, urdf_of
 from tests.robot.formats.test_sdf import joint as sdf_joint
