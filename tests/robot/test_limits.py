@@ -38,6 +38,7 @@ from tests.proposal.robots import GOOD, joint, link, serial, written
 from tests.robot.coupled_robots import CLAW, HAND, coupled_robot, urdf_of
 from tests.robot.formats.test_sdf import joint as sdf_joint
 from tests.robot.formats.test_sdf import link as sdf_link
+from tests.urdf_elements import robot_text
 
 KINDS = {"revolute": "hinge", "prismatic": "slide"}
 
@@ -51,7 +52,7 @@ def urdf(lower: float, upper: float, kind: str) -> str:
         joint("odd", "upper", "tip", limit, kind),
         link("tip"),
     ]
-    return '<robot name="robot">' + "".join(parts) + "</robot>"
+    return robot_text("robot", *parts)
 
 
 def xacro(lower: float, upper: float, kind: str) -> str:
