@@ -19,10 +19,10 @@ from excite_cli.api.loading import Case
 from excite_cli.api.planning import PlanProgress, plan_after
 from excite_cli.api.simulating import PositionDrive, simulate
 from excite_cli.atomic import write_text_atomically
-from excite_cli.campaign.command import MeasureCommand as MeasureCommand
 from excite_cli.campaign.inbox import Inbox as Inbox
 from excite_cli.campaign.measure import Measure as Measure
 from excite_cli.campaign.measure import Take
+from excite_cli.campaign.measure_command import MeasureCommand as MeasureCommand
 from excite_cli.campaign.records import (
     STATE,
     CampaignRound,

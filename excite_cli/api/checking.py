@@ -24,7 +24,7 @@ from excite_cli.excitation.result import Result
 from excite_cli.robot.model import Array
 from excite_cli.shown.note import Level, Note, Tell, log_note, unheard
 from excite_cli.store.result_file import is_result, read_result, read_samples
-from excite_cli.summary.inspections import check_answer as check_answer
+from excite_cli.summary.motion_inspections import check_answer as check_answer
 from excite_cli.trajectory.fade import Segment
 
 _JUDGED = ("robot", "constraints", "uncertainty")  # sections that verdicts speak of

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -43,36 +43,13 @@ from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.dataset import Dataset, joined, merged
 from excite_cli.report.page import render
 from excite_cli.robot.model import build_robot
-from excite_cli.shown.answer import Shown, show
 from excite_cli.shown.note import Tell, log_note
-from excite_cli.summary.inspection import headline, inspection_page, inspection_parts
-from excite_cli.summary.inspection import inspection_answer as inspection_answer
+from excite_cli.summary.log_inspection import LogInspection as LogInspection
+from excite_cli.summary.log_inspection import inspection_answer as inspection_answer
+from excite_cli.summary.log_inspection import inspection_page
 from excite_cli.summary.weakest import noise_in_words
 
 _ROUNDS = 4  # of looking, each with what the one before would set
-
-
-@dataclass(frozen=True, repr=False)
-class LogInspection(Shown):
-    """`results` in the order of the checks; `settings`: what would change in the config.
-
-    `power`: sizes of effects that a diagnosis would name with 95 %, if they were asked for, of
-    torques with this `noise`.
-    """
-
-    results: tuple[CheckResult, ...]
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    runs: tuple[str, ...] = ()
-    power: tuple[EffectPower, ...] = ()
-    noise: str = ""
-
-    @property
-    def good(self) -> bool:
-        """Whether nothing is wrong for certain."""
-        return all(each.status != "fault" for each in self.results)
-
-
-show(LogInspection, headline, inspection_parts)
 
 
 @checked()

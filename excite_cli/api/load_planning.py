@@ -22,7 +22,7 @@ from excite_cli.robot.link_frame import carrying_frame
 from excite_cli.shown.answer import Shown, show
 from excite_cli.shown.note import Level, Note, Tell, log_note, unheard
 from excite_cli.store.fit_file import read_fit
-from excite_cli.summary.problem import problem_parts
+from excite_cli.summary.problem_notes import problem_parts
 
 # Durations [s] that are tried; shorter runs are little more than the borders of the filters.
 SECONDS = (3.0, 4.0, 5.0, 6.0, 8.0, 10.0)

@@ -32,8 +32,8 @@ from excite_cli.robot.overview import describe
 from excite_cli.shown.answer import Shown, show
 from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.store.fit_file import fit_knowledge, read_fit
-from excite_cli.summary.inspection import runs_in_words
-from excite_cli.summary.problem import problem_notes
+from excite_cli.summary.log_inspection import runs_in_words
+from excite_cli.summary.problem_notes import problem_notes
 from excite_cli.summary.robots import robot_parts
 
 # The problem of a result, from the config that the result holds.

@@ -40,7 +40,7 @@ from excite_cli.store.result_file import is_result, read_result, write_result
 from excite_cli.summary.motions import motion_sentence
 from excite_cli.summary.motions import plan_answer as answer_of_plan
 from excite_cli.summary.pairs import doubts_in_words
-from excite_cli.summary.problem import problem_notes
+from excite_cli.summary.problem_notes import problem_notes
 from excite_cli.trajectory.catalogue import build_trajectory
 from excite_cli.trajectory.fade import Segment
 from excite_cli.workers.base import Workers

@@ -22,7 +22,7 @@ from excite_cli.robot.overview import DescribedRobot, describe, known_robots
 from excite_cli.robot.urdf_joints import survey
 from excite_cli.shown.answer import Answer
 from excite_cli.shown.note import Level, Note, Tell, log_note, never
-from excite_cli.summary.problem import proposal_answer
+from excite_cli.summary.problem_notes import proposal_answer
 from excite_cli.summary.robots import robot_answer as robot_answer
 from excite_cli.summary.robots import robots_answer
 

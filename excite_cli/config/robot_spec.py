@@ -3,7 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import radians
 from typing import Annotated, Any, Literal
 
@@ -41,7 +41,6 @@ class LimitPreset:
     acceleration: tuple[float, ...] = ()
     jerk: tuple[float, ...] = ()
     effort: tuple[float, ...] = ()
-    remark: str = field(default="")
 
     def of_joints(self, names: Sequence[str]) -> Iterator[tuple[str, Mapping[str, Any]]]:
         """Joints among `names` that the preset is about, each with its limits by their key."""
@@ -85,6 +84,8 @@ LIMIT_PRESETS: Mapping[str, LimitPreset] = {
         jerk=(7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0),
         effort=(87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0),
     ),
+    # Its speed limits depend on position; these are the position and speed limits that the manual
+    # suggests for planners of fixed limits.
     "franka_research_3": LimitPreset(
         "Franka Research 3",
         _FRANKA,
@@ -95,8 +96,6 @@ LIMIT_PRESETS: Mapping[str, LimitPreset] = {
         acceleration=(10.0,) * 7,
         jerk=(5000.0,) * 7,
         effort=(87.0, 87.0, 87.0, 87.0, 12.0, 12.0, 12.0),
-        remark="its speed limits depend on position; these are the position and speed limits that "
-        "the manual suggests for planners of fixed limits",
     ),
     "kuka_lbr_iiwa_14": LimitPreset(
         "KUKA LBR iiwa 14 R820",

@@ -32,8 +32,6 @@ class Criterion(ABC):
     """Starts of a motion where the config gives no number."""
     tolerance: float = 1e-3
     """Change of log f over 8 iterations that ends a start, where the config gives none."""
-    smooth: bool = True
-    """Whether f is differentiable where singular values meet."""
     compares_columns: bool = False
     """Whether it is about columns beside each other, so that one alone says nothing."""
 

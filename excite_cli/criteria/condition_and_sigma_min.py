@@ -17,7 +17,6 @@ class ConditionAndSigmaMin(Criterion):
     """log((σ_max + 1) / σ_min)."""
 
     name = "condition_and_sigma_min"
-    smooth = False  # extreme singular values meet at good optima
     compares_columns = True
 
     def value(self, sigma: Array) -> float:
@@ -32,7 +31,7 @@ class ConditionAndSigmaMin(Criterion):
         return derivative
 
     def continuation(self) -> tuple[Criterion, ...]:
-        """Smooth forms with rising p."""
+        """Smooth forms with rising p: extreme singular values meet at good optima."""
         return tuple(SmoothConditionAndSigmaMin(p) for p in SHARPNESS)
 
 

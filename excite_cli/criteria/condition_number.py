@@ -10,7 +10,6 @@ class ConditionNumber(Criterion):
     """log cond; not differentiable where the extreme singular values meet."""
 
     name = "condition_number"
-    smooth = False  # extreme singular values meet at good optima
     compares_columns = True
 
     def value(self, sigma: Array) -> float:
@@ -25,5 +24,5 @@ class ConditionNumber(Criterion):
         return derivative
 
     def continuation(self) -> tuple[Criterion, ...]:
-        """Smooth forms with rising p."""
+        """Smooth forms with rising p: extreme singular values meet at good optima."""
         return tuple(SmoothConditionNumber(p) for p in SHARPNESS)

@@ -12,7 +12,6 @@ class SigmaMin(Criterion):
     """−log σ_min; not differentiable where the smallest singular values meet."""
 
     name = "sigma_min"
-    smooth = False  # the smallest singular values meet at good optima
 
     def value(self, sigma: Array) -> float:
         """−log σ_min."""
@@ -25,7 +24,7 @@ class SigmaMin(Criterion):
         return derivative
 
     def continuation(self) -> tuple[Criterion, ...]:
-        """Smooth forms with rising p."""
+        """Smooth forms with rising p: the smallest singular values meet at good optima."""
         return tuple(SmoothSigmaMin(p) for p in SHARPNESS)
 
 

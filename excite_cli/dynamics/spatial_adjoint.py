@@ -185,8 +185,8 @@ class SpatialAdjoint:
         )
         turned = motion.rotations.transpose(0, 1, 3, 2)
         projected = self._local_columns(motion, turned) @ by_body
-        velocity = _to_local(turned, motion.translations, motion.velocity)
-        acceleration = _to_local(turned, motion.translations, motion.acceleration)
+        velocity = to_local(turned, motion.translations, motion.velocity)
+        acceleration = to_local(turned, motion.translations, motion.acceleration)
         acceleration[..., :3] += cross(velocity[..., 3:], velocity[..., :3])
         by_velocity, by_acceleration = _body_gradients(projected, velocity, acceleration)
         by_velocity = _force_to_world(motion, by_velocity)
@@ -258,7 +258,8 @@ def _axial(m: Array) -> Array:
     )
 
 
-def _to_local(turned: Array, translations: Array, spatial: Array) -> Array:
+def to_local(turned: Array, translations: Array, spatial: Array) -> Array:
+    """Motions (…, 6) about the world origin, in the frames of bodies; `turned` leads there."""
     linear = spatial[..., :3] + cross(spatial[..., 3:], translations)
     both = np.stack([linear, spatial[..., 3:]], axis=-1)
     local = turned @ both

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from excite_cli.dynamics.base_parameters import DUST, BaseParameters
 from excite_cli.dynamics.forward_kinematics import BatchKinematics, States
 from excite_cli.dynamics.regressor import Regressor, standard_parameter_names
-from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint, body_regressors, cross
+from excite_cli.dynamics.spatial_adjoint import SpatialAdjoint, body_regressors, cross, to_local
 from excite_cli.errors import ConfigError
 from excite_cli.robot.link_frame import carried_bodies, carrying_frame
 from excite_cli.robot.model import Array, Robot, links_by_joint
@@ -92,21 +92,14 @@ class GroundWrench:
         turn = np.concatenate([upright, motion.rotations], axis=1)
         place = np.concatenate([np.zeros((samples, 1, 3)), motion.translations], axis=1)
         back = turn.swapaxes(-1, -2)
-        velocity = _local(back, place, velocity)
-        acceleration = _local(back, place, acceleration)
+        velocity = to_local(back, place, velocity)
+        acceleration = to_local(back, place, acceleration)
         acceleration[..., :3] += cross(velocity[..., 3:], velocity[..., :3])
         local = body_regressors(velocity, acceleration)
         force, moment = turn @ local[..., :3, :], turn @ local[..., 3:, :]
         moment += cross(place[..., None, :], force.swapaxes(-1, -2)).swapaxes(-1, -2)
         wrench = np.concatenate([force, moment], axis=-2)
         return np.asarray(wrench.transpose(0, 2, 1, 3).reshape(samples, 6, -1))
-
-
-def _local(back: Array, place: Array, motion: Array) -> Array:
-    """Motions (T, B, 6) about the world origin, in the frames of their bodies."""
-    linear = motion[..., :3] + cross(motion[..., 3:], place)
-    turned = back @ np.stack([linear, motion[..., 3:]], axis=-1)
-    return np.concatenate([turned[..., 0], turned[..., 1]], axis=-1)
 
 
 # Centre of mass and its Jacobian, batched over samples.

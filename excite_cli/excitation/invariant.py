@@ -52,14 +52,14 @@ class FreeDesign:
 
 
 def free_design(
-    robot: Robot, base: BaseParameters, accelerations: Array, rows: Array, seed: int = 0
+    robot: Robot, base: BaseParameters, accelerations: Array, rows: Array
 ) -> FreeDesign:
     """The design over states within the limits of position, speed and `accelerations` (n,).
 
     rows: weights (R,) of the measured rows. Bounds that are infinite count as those that states
     are drawn from.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     lower, upper = state_bounds(robot, accelerations)
     states = _drawn(rng, lower, upper, _DRAWN)
     regressor = Regressor(robot)

@@ -11,11 +11,13 @@ from excite_cli.geometry.link_meshes import Poses
 from excite_cli.robot.model import Array
 from excite_cli.trajectory.fade import Segment
 
+_RATE = 100.0  # instants looked at [1/s]
 
-def closest_time(problem: Problem, segment: Segment, rate: float = 100.0) -> float:
+
+def closest_time(problem: Problem, segment: Segment) -> float:
     """When [s] least is left of the distances that are kept; 0 if there are none."""
     duration = segment.trajectory.duration
-    times = np.linspace(0.0, duration, max(2, int(np.ceil(duration * rate)) + 1))
+    times = np.linspace(0.0, duration, max(2, int(np.ceil(duration * _RATE)) + 1))
     states = States.along(problem.kinematics, segment.trajectory, segment.coefficients, times)
     found = [
         constraint.margins(states).min(axis=1)

@@ -42,14 +42,10 @@ class Figure:
 
 @dataclass(frozen=True)
 class Stage:
-    """The stage of a solver's continuation, from 1; `barrier` is its parameter, if it has one.
-
-    Stage 0 is a start that has ended.
-    """
+    """The stage of a solver's continuation, from 1; stage 0 is a start that has ended."""
 
     number: int = 0
     total: int = 0
-    barrier: float | None = None
 
 
 @dataclass(frozen=True)

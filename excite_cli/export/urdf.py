@@ -25,17 +25,10 @@ from excite_cli.export.exported import (
     vector,
 )
 from excite_cli.identification.identified_model import IdentifiedModel
+from excite_cli.robot.formats.base import INERTIA_ENTRIES
 from excite_cli.robot.model import Array, Robot
 from excite_cli.robot.urdf_joints import link_at
 
-_INERTIA = (
-    ("ixx", 0, 0),
-    ("ixy", 0, 1),
-    ("ixz", 0, 2),
-    ("iyy", 1, 1),
-    ("iyz", 1, 2),
-    ("izz", 2, 2),
-)
 _UNCHANGED = 1e-14
 
 
@@ -153,7 +146,7 @@ def _ten_of(link: ElementTree.Element) -> Array:
         rotation = _rotation(*(float(word) for word in origin.get("rpy", "0 0 0").split()))
     about = np.zeros((3, 3))
     if inertia is not None:
-        for name, row, column in _INERTIA:
+        for name, row, column in INERTIA_ENTRIES:
             about[row, column] = about[column, row] = float(inertia.get(name, "0"))
     lever = center @ center * np.eye(3) - np.outer(center, center)
     full = rotation @ about @ rotation.T + m * lever
@@ -183,7 +176,7 @@ def _write(link: ElementTree.Element, ten: Array) -> None:
         inertial.remove(child)
     ElementTree.SubElement(inertial, "origin", {"xyz": vector(center), "rpy": "0 0 0"})
     ElementTree.SubElement(inertial, "mass", {"value": number(mass)})
-    entries = {name: number(inertia[row, column]) for name, row, column in _INERTIA}
+    entries = {name: number(inertia[row, column]) for name, row, column in INERTIA_ENTRIES}
     ElementTree.SubElement(inertial, "inertia", entries)
 
 

@@ -13,7 +13,6 @@ from excite_cli.measurement.arrange import arrange, check_names, listed
 from excite_cli.measurement.base_channel import channels_of_base
 from excite_cli.measurement.covariates import DeclaredCovariates
 from excite_cli.measurement.csv_reader import run_of_table
-from excite_cli.measurement.csv_table import NamedColumns
 from excite_cli.measurement.dataset import Array, Dataset, Finding, Run
 from excite_cli.measurement.joined_files import is_part, with_joined
 from excite_cli.measurement.missing_values import known_stamps
@@ -22,6 +21,7 @@ from excite_cli.measurement.quality import checked
 from excite_cli.measurement.reader import SINCE_1970, RawRun, Reader, ReadOptions
 from excite_cli.measurement.recording_limits import RecordingLimits
 from excite_cli.measurement.run_identity import Origin
+from excite_cli.measurement.text_table import NamedColumns
 from excite_cli.measurement.torque import SECONDS, check_joints, check_motors, declared, to_joints
 from excite_cli.measurement.torque_sources.catalogue import torque_source
 from excite_cli.out_of_core import Spool

@@ -9,7 +9,6 @@ import numpy as np
 
 from excite_cli.errors import FileError, nearest
 from excite_cli.measurement.arrange import listed
-from excite_cli.measurement.csv_table import NamedColumns, read_table
 from excite_cli.measurement.dataset import Array, Finding
 from excite_cli.measurement.reader import (
     CHANNELS,
@@ -20,6 +19,7 @@ from excite_cli.measurement.reader import (
     ReadOptions,
     times_from_rate,
 )
+from excite_cli.measurement.text_table import NamedColumns, read_table
 
 # Columns as other programs name them, in our names: `t`, `q_<joint>`, `dq_<joint>`, `tau_<joint>`.
 #

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run, Severity
-from excite_cli.measurement.moving import moves
+from excite_cli.measurement.stretches import moves
 
 _MOSTLY, _FEWEST = 0.6, 50  # share of samples in motion with one torque; and how many there must be
 

@@ -11,7 +11,6 @@ import numpy as np
 from excite_cli.errors import ExciteError, FileError, MissingExtraError
 from excite_cli.measurement.arrange import listed
 from excite_cli.measurement.csv_reader import run_of_table
-from excite_cli.measurement.csv_table import NamedColumns
 from excite_cli.measurement.dataset import Array, Finding
 from excite_cli.measurement.memory_limit import is_shortage, limited_memory, short_of_memory
 from excite_cli.measurement.reader import (
@@ -22,6 +21,7 @@ from excite_cli.measurement.reader import (
     check_unpacked,
     check_values,
 )
+from excite_cli.measurement.text_table import NamedColumns
 
 # LeRobot's datasets: their files, and their columns in our names.
 #

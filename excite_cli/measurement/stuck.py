@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from excite_cli.measurement.dataset import Array, Finding, Mask, Run
-from excite_cli.measurement.moving import moves
-from excite_cli.measurement.stretches import stretches
+from excite_cli.measurement.stretches import moves, stretches
 
 _SHORTEST = 0.1  # s, of a single channel
 _FEWEST = 20  # samples, of a single channel

@@ -8,8 +8,8 @@ import numpy as np
 
 from excite_cli.errors import FileError
 from excite_cli.measurement.csv_reader import CsvReader
-from excite_cli.measurement.csv_table import header_of, read_table
 from excite_cli.measurement.dataset import Array
+from excite_cli.measurement.text_table import header_of, read_table
 from excite_cli.motion_formats.base import MotionFormat
 from excite_cli.motion_formats.timed_motion import TimedMotion
 

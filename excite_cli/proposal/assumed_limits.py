@@ -136,9 +136,9 @@ def _as_given(value: float, unit: str) -> str:
     return "none" if math.isnan(value) else f"{value:g} {unit}"
 
 
-def rounded(value: float, digits: int = 2) -> float:
-    """`value` to some significant digits."""
-    return float(f"{value:.{digits}g}")
+def rounded(value: float) -> float:
+    """`value` to two significant digits."""
+    return float(f"{value:.2g}")
 
 
 # How long a motion should be, and how many harmonics it should have.

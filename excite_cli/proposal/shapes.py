@@ -8,8 +8,9 @@ from pathlib import Path
 
 from excite_cli.errors import RobotError
 from excite_cli.robot.allowed_files import allowed_files
-from excite_cli.robot.description import MAX_URDF_BYTES, RobotDescription
+from excite_cli.robot.description import RobotDescription
 from excite_cli.robot.mesh_paths import Unusable, unusable, without_unusable
+from excite_cli.robot.urdf_check import xml_text
 from excite_cli.robot.urdf_joints import UrdfSurvey, link_at, survey
 
 # SRDF, what MoveIt and others write beside a URDF: postures, and pairs not to check.
@@ -57,15 +58,7 @@ def read_srdf(path: Path) -> Srdf:
         It is missing, not XML without a document type, or too large.
     """
     try:
-        if path.stat().st_size > MAX_URDF_BYTES:
-            raise RobotError(f"{path} is larger than {MAX_URDF_BYTES // 10**6} MB: not an SRDF.")
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise RobotError(f"{path} cannot be read as text: {error}") from error
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise RobotError(f"{path} declares a document type or entities; an SRDF needs neither.")
-    try:
-        root = ElementTree.fromstring(text)
+        root = ElementTree.fromstring(xml_text(path, "an SRDF"))
     except ElementTree.ParseError as error:
         raise RobotError(f"{path} is not well-formed XML: {error}") from error
     disabled = tuple(

@@ -19,7 +19,7 @@ from scipy.spatial import ConvexHull, QhullError
 from excite_cli.arrays import Array
 from excite_cli.disk_cache import store_arrays, stored_arrays
 from excite_cli.robot.description import RobotDescription
-from excite_cli.robot.formats.base import origin_of
+from excite_cli.robot.formats.base import add_inertial, origin_of
 from excite_cli.robot.mesh_paths import Kind, MeshFiles, unusable
 
 Element = ElementTree.Element
@@ -104,13 +104,7 @@ def _give(link: Element, moments: _Moments, density: float) -> None:
     centre = moments.first / moments.volume
     second = density * (moments.second - moments.volume * np.outer(centre, centre))
     inertia = np.trace(second) * np.eye(3) - second
-    inertial = ElementTree.SubElement(link, "inertial")
-    ElementTree.SubElement(inertial, "origin", xyz=" ".join(map(repr, centre.tolist())))
-    ElementTree.SubElement(inertial, "mass", value=repr(float(density * moments.volume)))
-    names = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 1, 2),
-             ("izz", 2, 2))  # fmt: skip
-    figures = {name: repr(float(inertia[i, j])) for name, i, j in names}
-    ElementTree.SubElement(inertial, "inertia", figures)
+    add_inertial(link, float(density * moments.volume), centre, inertia)
 
 
 def _of_shape(shape: Element, files: MeshFiles) -> _Moments | None:

@@ -26,7 +26,7 @@ from excite_cli.robot.formats.catalogue import as_urdf
 from excite_cli.robot.limits import UNBOUNDED, ordered_limits
 from excite_cli.robot.loops import Loop, Mimic, closed_loops, loops_in_words, lost, mimics
 from excite_cli.robot.ros_packages import PREFIX, Found, find_description
-from excite_cli.robot.urdf_check import parsed
+from excite_cli.robot.urdf_check import parsed, xml_text
 
 # What simulators take in a URDF and its standard does not have, put into the standard's words.
 #
@@ -65,7 +65,6 @@ def _without_capsule(link: ElementTree.Element, item: ElementTree.Element) -> No
 
 
 EXAMPLE_PREFIX = "example-robot-data:"
-MAX_URDF_BYTES = 20_000_000
 # How far [rad] an angle is off a right one that was meant, and from where on that matters.
 _ROUNDED, _EXACT = 1e-4, 1e-8
 
@@ -174,9 +173,8 @@ def load_description(
             raise RobotError(f"robot.package_dirs: there is no folder {given} ({folder}).")
     file = _file(urdf, root)
     path, dirs = file.path, (*extra, *file.package_dirs)
-    found = as_urdf(
-        path, _read(path), ConversionRequest(dirs, {**file.arguments, **(arguments or {})})
-    )
+    text = xml_text(path, "a URDF").rstrip("\0 \t\r\n")  # some files end so
+    found = as_urdf(path, text, ConversionRequest(dirs, {**file.arguments, **(arguments or {})}))
     tree = parsed(path, found.text)
     strange, swapped = put_into_standard(tree), ordered_limits(path, tree)
     followers, loops = mimics(path, tree), closed_loops(tree)
@@ -249,18 +247,6 @@ def require_limits(description: RobotDescription) -> None:
                 'no <limit>, which a URDF must give: <limit lower="…" upper="…" velocity="…" '
                 'effort="…"/>. A joint that turns without end is of type continuous.'
             )
-
-
-def _read(path: Path) -> str:
-    try:
-        if path.stat().st_size > MAX_URDF_BYTES:
-            raise RobotError(f"{path} is larger than {MAX_URDF_BYTES // 10**6} MB: not a URDF.")
-        text = path.read_text(encoding="utf-8").rstrip("\0 \t\r\n")  # some files end so
-    except (OSError, UnicodeDecodeError) as error:
-        raise RobotError(f"{path} cannot be read as text: {error}") from error
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise RobotError(f"{path} declares a document type or entities; a URDF needs neither.")
-    return text
 
 
 def _square(root: ElementTree.Element) -> None:

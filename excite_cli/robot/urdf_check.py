@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 
 from excite_cli.errors import RobotError
 
+MAX_BYTES = 20_000_000  # of a text
 MAX_DEPTH = 40
 MAX_ELEMENTS = 200_000
 MAX_LINKS = 1000
@@ -40,6 +41,26 @@ _PLACES = (
     "link/collision/geometry/*",
 )
 _SIZES = ("size", "radius", "length")
+
+
+def xml_text(path: Path, what: str) -> str:
+    """The text of a file that is `what`, as "a URDF": XML that needs no document type.
+
+    Raises
+    ------
+    RobotError
+        It cannot be read, is too large or no text, or declares a document type or entities, which
+        may read other files and grow without end.
+    """
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise RobotError(f"{path} is larger than {MAX_BYTES // 10**6} MB: not {what}.")
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise RobotError(f"{path} cannot be read as text: {error}") from error
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise RobotError(f"{path} declares a document type or entities; {what} needs neither.")
+    return text
 
 
 def parsed(path: Path, text: str) -> ElementTree.Element:

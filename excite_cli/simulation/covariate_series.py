@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from excite_cli.errors import ConfigError, nearest
-from excite_cli.measurement.csv_table import read_table
+from excite_cli.measurement.text_table import read_table
 from excite_cli.robot.model import Array
 
 FORM = "name=start[,end:value,time_constant:seconds,noise:sd], or name=FILE.csv"

@@ -3,18 +3,22 @@
 from collections.abc import Iterator
 from math import isnan, nan
 
+import numpy as np
+
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.diagnosis.words import assumption_in_words, counted, ends_in_words
+from excite_cli.geometry.link_meshes import Poses
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit_words import above_the_floor
 from excite_cli.report.chart import Chart
 from excite_cli.report.error_chart import DECLARED_AND_FOUND, NOTHING_MOVES, error_charts
 from excite_cli.report.posture_chart import robot_chart
+from excite_cli.report.robot_faces import Faces
 from excite_cli.robot.model import Robot
 from excite_cli.shown.answer import Block, Charts, Detail, Section, Table
 from excite_cli.summary.cells import figure, percent
 from excite_cli.summary.named_effects import what_and_where
-from excite_cli.summary.robot_shape import faces_of
+from excite_cli.view.geometry import robot_bodies
 
 _OFF = "change by effect (pp)"
 _NAMED, _WORTH = 3, 0.1  # parts that are named in a row, and the least share of the fall
@@ -227,3 +231,30 @@ def _all_samples(found: Diagnosis) -> Table:
     )
     errors = {name: percent(each.mean_relative) for name, each in errors_by_model(found).items()}
     return _with_mean(title, rows, errors, folded=True)
+
+
+# The robot in its posture, as it is drawn beside the errors.
+
+_SMALL = 1 / 35  # of the robot's size: detail that is left out
+
+
+def faces_of(robot: Robot) -> Faces | None:
+    """Its visual shapes, without small detail; None where there are none."""
+    poses = Poses.of(robot, robot.posture[None])
+    reach = float(np.ptp(poses.translations[0], axis=0).max()) or 1.0
+    bodies = robot_bodies(robot, _SMALL * reach)[0]
+    corners = [
+        poses.points(body.joint, body.surface.points)[0][body.surface.faces] for body in bodies
+    ]
+    if not any(len(each) for each in corners):
+        return None
+    joints = np.repeat([_mover(robot, body.joint) for body in bodies], [len(c) for c in corners])
+    return Faces(np.concatenate(corners), joints)
+
+
+def _mover(robot: Robot, joint: int) -> int:
+    """The moved joint that carries a joint of the model; how many there are if none does."""
+    own = [int(each) for each in robot.model_joints]
+    while joint > 0 and joint not in own:
+        joint = int(robot.model.parents[joint])
+    return own.index(joint) if joint > 0 else robot.n

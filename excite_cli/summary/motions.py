@@ -27,7 +27,7 @@ from excite_cli.summary.pairs import (
     pairs_in_words,
     worst_data,
 )
-from excite_cli.summary.problem import problem_parts
+from excite_cli.summary.problem_notes import problem_parts
 from excite_cli.summary.weakest import expectation_parts, power_data
 from excite_cli.trajectory.fade import Segment
 

@@ -15,19 +15,15 @@ from scipy.spatial.transform import Rotation
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.measurement.dataset import Run
 from excite_cli.robot.model import Robot, build_measured_robot
+from tests.urdf_elements import joint, link, robot_text
 
 Array = NDArray[np.float64]
 FEET = ("left_sole", "right_sole")
-_LIMITS = '<limit lower="-2" upper="2" velocity="3" effort="80"/>'
+_LIMITS = 'lower="-2" upper="2" velocity="3" effort="80"'
 
 
 def _link(name: str, mass: float, center: str, moments: str) -> str:
-    ixx, iyy, izz = moments.split()
-    return (
-        f'<link name="{name}"><inertial><origin xyz="{center}" rpy="0.2 -0.1 0.3"/>'
-        f'<mass value="{mass}"/><inertia ixx="{ixx}" iyy="{iyy}" izz="{izz}" ixy="0" ixz="0" '
-        f'iyz="0"/></inertial></link>'
-    )
+    return link(name, mass, moments, center, turn="0.2 -0.1 0.3")
 
 
 def _fixed(name: str, parent: str, place: str) -> str:
@@ -38,31 +34,27 @@ def _fixed(name: str, parent: str, place: str) -> str:
 
 
 def _arm(side: str, y: float) -> str:
+    upper, hand = f"{side}_upper", f"{side}_hand"
     return "".join(
         [
-            _link(f"{side}_upper", 2.5, "0.02 0.01 -0.15", "0.04 0.05 0.02"),
-            _link(f"{side}_hand", 1.4, "0.01 -0.02 -0.12", "0.02 0.025 0.01"),
-            f'<joint name="{side}_shoulder" type="revolute"><parent link="trunk"/>'
-            f'<child link="{side}_upper"/><origin xyz="0 {y} 0.4" rpy="0.3 0 0"/>'
-            f'<axis xyz="0 1 0"/>{_LIMITS}</joint>',
-            f'<joint name="{side}_elbow" type="revolute"><parent link="{side}_upper"/>'
-            f'<child link="{side}_hand"/><origin xyz="0.02 0 -0.3"/>'
-            f'<axis xyz="1 0 0"/>{_LIMITS}</joint>',
+            _link(upper, 2.5, "0.02 0.01 -0.15", "0.04 0.05 0.02"),
+            _link(hand, 1.4, "0.01 -0.02 -0.12", "0.02 0.025 0.01"),
+            joint(
+                f"{side}_shoulder", ("trunk", upper), f"0 {y} 0.4", "0 1 0", _LIMITS, turn="0.3 0 0"
+            ),
+            joint(f"{side}_elbow", (upper, hand), "0.02 0 -0.3", "1 0 0", _LIMITS),
         ]
     )
 
 
-URDF = "".join(
-    [
-        '<robot name="stander">',
-        _link("trunk", 25.0, "0.03 0.01 0.1", "1.2 1.0 0.5"),
-        _fixed("left_sole", "trunk", 'xyz="0.02 0.1 -0.9" rpy="0 0 0.2"'),
-        _fixed("right_sole", "trunk", 'xyz="0.02 -0.1 -0.9" rpy="0 0.1 -0.2"'),
-        _fixed("unit", "trunk", 'xyz="-0.1 0.05 0.2" rpy="0.4 0.3 -1.0"'),
-        _arm("left", 0.2),
-        _arm("right", -0.2),
-        "</robot>",
-    ]
+URDF = robot_text(
+    "stander",
+    _link("trunk", 25.0, "0.03 0.01 0.1", "1.2 1.0 0.5"),
+    _fixed("left_sole", "trunk", 'xyz="0.02 0.1 -0.9" rpy="0 0 0.2"'),
+    _fixed("right_sole", "trunk", 'xyz="0.02 -0.1 -0.9" rpy="0 0.1 -0.2"'),
+    _fixed("unit", "trunk", 'xyz="-0.1 0.05 0.2" rpy="0.4 0.3 -1.0"'),
+    _arm("left", 0.2),
+    _arm("right", -0.2),
 )
 
 

@@ -14,7 +14,7 @@ PATIENCE = 60.0  # s, for a busy machine
 _SCRIPT = """
 import resource, signal, sys
 from pathlib import Path
-from excite_cli.campaign.command import MeasureCommand
+from excite_cli.campaign.measure_command import MeasureCommand
 from excite_cli.campaign.measure import NotMeasuredError
 from excite_cli.cli.stopping import heed_signals, stopped
 from tests.campaign.campaign_process import take_in

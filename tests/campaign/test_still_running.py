@@ -10,9 +10,9 @@ from threading import Thread
 
 import pytest
 
-from excite_cli.campaign import command, supervised
-from excite_cli.campaign.command import MeasureCommand
+from excite_cli.campaign import measure_command, supervised
 from excite_cli.campaign.measure import NotMeasuredError, StillRunningError
+from excite_cli.campaign.measure_command import MeasureCommand
 from excite_cli.campaign.process_table import running
 from excite_cli.campaign.same_motion import is_measured
 from excite_cli.campaign.supervised import left_in
@@ -96,7 +96,7 @@ def test_what_still_runs_is_said_before_an_interruption(
         os.kill(os.getpid(), signal.SIGINT)
         return next(ends)
 
-    monkeypatch.setattr(command, "followed", interrupted)
+    monkeypatch.setattr(measure_command, "followed", interrupted)
     measure, take = MeasureCommand.of("x {motion} {data}"), take_in(tmp_path)
     with interrupts():
         with pytest.raises(StillRunningError, match=r"^still running: process 4711 \(python\), "):

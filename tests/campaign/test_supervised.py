@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli.campaign.command import MeasureCommand
 from excite_cli.campaign.measure import StillRunningError
+from excite_cli.campaign.measure_command import MeasureCommand
 from excite_cli.campaign.process_table import running
 from excite_cli.campaign.same_motion import is_measured
 from excite_cli.campaign.supervised import held_while_it_runs, left_in

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import mujoco
@@ -21,6 +22,7 @@ from excite_cli.measurement.catalogue import read_dataset
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.robot.model import Array, Robot, build_robot
 from excite_cli.simulation.ground_truth import PlantedEffect, plant
+from tests import urdf_elements
 from tests.simulation.arms import arm, played
 
 LOGS = Path(__file__).resolve().parents[2] / "data"
@@ -196,18 +198,12 @@ def test_real_logs(name: str) -> None:
 _BONE = 0.35
 SIDES, PARTS = ("left", "right"), ("hip", "knee", "ankle")
 JOINTS = tuple(f"{side}_{part}" for side in SIDES for part in PARTS)
-_SOLE = (
-    '<collision><origin xyz="0.02 0 -0.03"/><geometry><box size="0.24 0.12 0.02"/></geometry>'
-    "</collision>"
-)
+_SOLE = urdf_elements.box("0.24 0.12 0.02", "0.02 0 -0.03")
+_LIMITS = 'lower="-2.5" upper="2.5" velocity="5" effort="900"'
 
 
-def _link(name: str, mass: float, center: str, shape: str = "") -> str:
-    return (
-        f'<link name="{name}"><inertial><origin xyz="{center}"/><mass value="{mass}"/>'
-        '<inertia ixx="0.05" iyy="0.04" izz="0.03" ixy="0" ixz="0" iyz="0"/></inertial>'
-        f"{shape}</link>"
-    )
+def _link(name: str, mass: float, center: str, shapes: str = "") -> str:
+    return urdf_elements.link(name, mass, "0.05 0.04 0.03", center, shapes)
 
 
 def _leg(side: str, y: float) -> str:
@@ -218,17 +214,13 @@ def _leg(side: str, y: float) -> str:
     ]
     names = ["pelvis", *(f"{side}_{bone}" for bone in ("thigh", "shank", "foot"))]
     places = (f"0 {y} 0", f"0 0 {-_BONE}", f"0 0 {-_BONE}")
-    for part, parent, child, place in zip(PARTS, names, names[1:], places, strict=False):
-        bones.append(
-            f'<joint name="{side}_{part}" type="revolute"><parent link="{parent}"/>'
-            f'<child link="{child}"/><origin xyz="{place}"/><axis xyz="0 1 0"/>'
-            '<limit lower="-2.5" upper="2.5" velocity="5" effort="900"/></joint>'
-        )
+    for part, ends, place in zip(PARTS, pairwise(names), places, strict=True):
+        bones.append(urdf_elements.joint(f"{side}_{part}", ends, place, "0 1 0", _LIMITS))
     return "".join(bones)
 
 
 PELVIS = _link("pelvis", 30.0, "0.02 0 0.2")
-URDF = f'<robot name="biped">{PELVIS}{_leg("left", 0.12)}{_leg("right", -0.12)}</robot>'
+URDF = urdf_elements.robot_text("biped", PELVIS, _leg("left", 0.12), _leg("right", -0.12))
 
 
 @pytest.fixture(scope="module")

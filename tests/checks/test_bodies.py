@@ -6,13 +6,7 @@ import pytest
 
 from excite_cli.api.loading import load_case
 from excite_cli.checks.bodies import bodies_in_words, impossible_bodies
-
-_LINK = (
-    '<robot name="one"><link name="w"/><link name="arm"><inertial><mass value="{mass}"/>'
-    '<inertia ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="0" ixz="0" iyz="0"/></inertial></link>'
-    '<joint name="j" type="revolute"><parent link="w"/><child link="arm"/><axis xyz="0 1 0"/>'
-    '<limit lower="-1" upper="1" velocity="1" effort="9"/></joint></robot>'
-)
+from tests.urdf_elements import joint, link, robot_text
 
 
 @pytest.mark.parametrize(
@@ -31,7 +25,8 @@ def test_moments_of_inertia(
 ) -> None:
     xx, yy, zz = moments
     urdf = tmp_path / "one.urdf"
-    urdf.write_text(_LINK.format(mass=mass, xx=xx, yy=yy, zz=zz), encoding="utf-8")
+    parts = '<link name="w"/>', link("arm", mass, f"{xx} {yy} {zz}"), joint("j", ("w", "arm"))
+    urdf.write_text(robot_text("one", *parts), encoding="utf-8")
     robot = load_case({"robot": {"urdf": str(urdf)}}).robot
     found = impossible_bodies(robot)
     assert [each.status for each in found] == ([status] if status else [])

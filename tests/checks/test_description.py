@@ -17,6 +17,7 @@ from excite_cli.checks.check_result import CheckResult
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.config.spec import Spec
 from excite_cli.robot.model import Array, build_robot
+from tests import urdf_elements
 
 Link = dict[str, Any]
 _SIDES = ("left", "right")
@@ -54,23 +55,23 @@ def inertia_of(points: Array) -> Array:
 
 
 def urdf_of(links: list[Link]) -> str:
-    text = '<robot name="arms"><link name="base"/>'
+    parts = ['<link name="base"/>']
     for link in links:
         c, s, axes = link["centre"], link["size"], Rotation.from_euler("xyz", link["turn"])
         i = axes.as_matrix().T @ link["inertia"] @ axes.as_matrix()
-        box, rpy = " ".join(map(str, s)), " ".join(map(str, link["turn"]))
-        text += (
-            f'<link name="{link["name"]}"><inertial><origin xyz="{c[0]} {c[1]} {c[2]}" '
-            f'rpy="{rpy}"/>'
-            f'<mass value="{link["mass"]}"/><inertia ixx="{i[0, 0]}" iyy="{i[1, 1]}" '
-            f'izz="{i[2, 2]}" ixy="{i[0, 1]}" ixz="{i[0, 2]}" iyz="{i[1, 2]}"/></inertial>'
-            f'<collision><origin xyz="{s[0] / 2} 0 0"/><geometry><box size="{box}"/></geometry>'
-            f'</collision></link><joint name="to_{link["name"]}" type="revolute">'
-            f'<axis xyz="0 0 1"/><parent link="{link["parent"]}"/><child link="{link["name"]}"/>'
-            f'<origin xyz="{link["at"]} 0 0" rpy="{rpy}"/>'
-            f'<limit lower="-1" upper="1" {link["limit"]}/></joint>'
+        moments = i[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        centre, size, turn, inertia = (
+            " ".join(map(str, each)) for each in (c, s, link["turn"], moments)
         )
-    return f"{text}</robot>"
+        shape, ends = urdf_elements.box(size, f"{s[0] / 2} 0 0"), (link["parent"], link["name"])
+        limits = f'lower="-1" upper="1" {link["limit"]}'
+        parts += [
+            urdf_elements.link(link["name"], link["mass"], inertia, centre, shape, turn),
+            urdf_elements.joint(
+                f"to_{link['name']}", ends, f"{link['at']} 0 0", limits=limits, turn=turn
+            ),
+        ]
+    return urdf_elements.robot_text("arms", *parts)
 
 
 def judged(links: list[Link], **keys: Any) -> list[CheckResult]:

@@ -68,9 +68,12 @@ def test_a_reader_that_leaves_is_no_error(shell, words: str, rest: str, status: 
 
 
 def test_an_answer_that_a_full_disk_loses_is_an_error(shell, two_motions: Run) -> None:  # type: ignore[no-untyped-def]
-    run = shell("check", SMOKE, two_motions.path, *BROKEN, rest="> /dev/full")
-    assert run.returncode == 2
-    assert "standard output: no space is left on the disk" in run.stderr
+    run = shell("schema", rest="> /dev/full")
+    assert run.stderr.startswith("error: standard output: no space is left on the disk.")
+    assert run.stderr.count("\n") == 1
+    bad = shell("check", SMOKE, two_motions.path, *BROKEN, rest="> /dev/full")
+    assert run.returncode == bad.returncode == 2
+    assert "standard output: no space is left on the disk" in bad.stderr
 
 
 PLAIN = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": "ascii"}

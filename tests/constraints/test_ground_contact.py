@@ -14,6 +14,7 @@ from excite_cli.dynamics.whole_robot import CenterOfMass
 from excite_cli.errors import ConfigError
 from excite_cli.robot.model import Array, Robot, build_robot
 from tests.robot.random_robots import random_robot
+from tests.urdf_elements import joint, link, robot_text
 
 SQUARE = ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5))
 SPEC = ContactSpec(vertices=SQUARE, margin=0.1, friction=0.4, torsion=0.1, min_load=20.0)
@@ -49,19 +50,12 @@ def test_at_rest_the_zero_moment_point_is_below_the_centre_of_mass(floating: boo
         )
 
 
-SLIDER = """<robot name="slider">
-<link name="foot"><inertial><mass value="30"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0"
- iyz="0"/></inertial></link>
-<link name="block"><inertial><mass value="10"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0"
- iyz="0"/></inertial></link>
-<joint name="slide" type="prismatic"><parent link="foot"/><child link="block"/>
-<origin xyz="0 0 {height}"/><axis xyz="{axis}"/>
-<limit lower="-1" upper="1" velocity="2" effort="100"/></joint></robot>"""
-
-
 def slider(folder: Path, axis: str, height: float) -> Robot:
     path = folder / "slider.urdf"
-    path.write_text(SLIDER.format(axis=axis, height=height), encoding="utf-8")
+    limits = 'lower="-1" upper="1" velocity="2" effort="100"'
+    slide = joint("slide", ("foot", "block"), f"0 0 {height}", axis, limits, "prismatic")
+    text = robot_text("slider", link("foot", 30), link("block", 10), slide)
+    path.write_text(text, encoding="utf-8")
     return build_robot(RobotSpec(urdf=str(path)))
 
 

@@ -18,6 +18,7 @@ from excite_cli.dynamics.regressor import Regressor, standard_parameters
 from excite_cli.robot.description import load_description
 from excite_cli.robot.model import Robot, build_robot
 from tests.robot.random_robots import random_robot
+from tests.urdf_elements import joint, link, robot_text
 
 ARMS = tuple(f"arm_{side}_{i}_joint" for side in ("left", "right") for i in range(1, 8))
 
@@ -89,12 +90,7 @@ def test_words_say_what_is_grouped() -> None:
 
 
 HALF_TURN = (np.pi, 0.0, 0.0)
-LINK = """<link name="l{0}">
-<inertial><origin xyz="0.1 0.05 0.2"/><mass value="2"/>
-<inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0.001" ixz="0.002" iyz="0"/></inertial></link>"""
-JOINT = """<joint name="j{0}" type="revolute"><parent link="l{1}"/><child link="l{0}"/>
-<origin xyz="0 0.1 0.3" rpy="{2}"/><axis xyz="0 0 1"/>
-<limit lower="-2" upper="2" velocity="3" effort="50"/></joint>"""
+MOMENTS = "0.02 0.03 0.025 0.001 0.002 0"
 
 
 def _condition(robot: Robot, base: BaseParameters) -> float:
@@ -129,12 +125,20 @@ def test_a_base_that_is_turned_by_nearly_half_a_turn(urdf: str, angle: float) ->
 @pytest.mark.parametrize("angle", ["1.57", "1.571", "1.5708"])
 def test_an_upright_axis_behind_two_rounded_turns(angle: str, tmp_path: Path) -> None:
     def robot(angle: str) -> Robot:
-        fixed = JOINT.format(1, 0, f"{angle} 0 0").replace("revolute", "fixed")
-        turns = ("-1.5707963267948966 0 0", f"{angle} 0 0")
-        links = "".join(LINK.format(k) for k in range(4))
-        joints = "".join(JOINT.format(k, k - 1, turn) for k, turn in enumerate(turns, start=2))
+        turns = (f"{angle} 0 0", "-1.5707963267948966 0 0", f"{angle} 0 0")
+        links = [link(f"l{k}", 2, MOMENTS, "0.1 0.05 0.2") for k in range(4)]
+        joints = [
+            joint(
+                f"j{k}",
+                (f"l{k - 1}", f"l{k}"),
+                "0 0.1 0.3",
+                turn=turn,
+                kind="fixed" if k == 1 else "revolute",
+            )
+            for k, turn in enumerate(turns, start=1)
+        ]
         path = tmp_path / f"{angle}.urdf"
-        path.write_text(f'<robot name="r">{links}{fixed}{joints}</robot>', encoding="utf-8")
+        path.write_text(robot_text("r", *links, *joints), encoding="utf-8")
         return build_robot(RobotSpec(urdf=str(path)))
 
     base = _same(robot(angle), robot(repr(np.pi / 2)))

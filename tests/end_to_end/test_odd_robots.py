@@ -10,23 +10,20 @@ from excite_cli.errors import ConfigError, NoAdmissibleMotionError
 from excite_cli.excitation.admissible import verdicts
 from excite_cli.excitation.problem import Problem, build_problem
 from tests.excitation.smoke import planned
+from tests.urdf_elements import link, robot_text
 
-LINK = (
-    '<link name="{name}"><inertial><origin xyz="0.1 0 0.2"/><mass value="{mass}"/>'
-    '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
-)
 SETTINGS = "trajectory: {harmonics: 3}\noptimizer: {max_iterations: 8}\n"
 
 
 def _problem(folder: Path, joints: list[str], settings: str = SETTINGS) -> Problem:
-    parts = [LINK.format(name="l0", mass="1")]
+    parts = [link("l0", 1, "0.1 0.1 0.1", "0.1 0 0.2")]
     for number, joint in enumerate(joints, start=1):
-        parts.append(LINK.format(name=f"l{number}", mass="2"))
+        parts.append(link(f"l{number}", 2, "0.1 0.1 0.1", "0.1 0 0.2"))
         parts.append(
             f'<joint name="j{number}" {joint}<parent link="l{number - 1}"/>'
             f'<child link="l{number}"/><origin xyz="0 0.1 0.3"/></joint>'
         )
-    (folder / "r.urdf").write_text(f'<robot name="r">{"".join(parts)}</robot>')
+    (folder / "r.urdf").write_text(robot_text("r", *parts))
     return build_problem(parse_spec(f"robot: {{urdf: r.urdf}}\n{settings}"), folder)
 
 

@@ -13,7 +13,7 @@ import pytest
 from excite_cli import load_case, run_campaign, simulate
 from excite_cli.api.campaigning import CampaignOptions, Inbox
 from excite_cli.api.simulating import SimulationSettings
-from excite_cli.campaign import command, inbox
+from excite_cli.campaign import inbox, measure_command
 from excite_cli.campaign.same_motion import record_measured
 from excite_cli.campaign.supervisor import ProgramExit
 from excite_cli.shown.note import Note
@@ -109,7 +109,7 @@ def test_nothing_is_played_while_something_may_still_move_the_robot(
         tries.append(given)
         return ProgramExit(None, "limit", alive="process 4711 (python)")
 
-    monkeypatch.setattr(command, "followed", not_ended)
+    monkeypatch.setattr(measure_command, "followed", not_ended)
     run = begun(*ASKED, *LINE, "--resume", "--retries", "5")
     assert run.returncode == 1
     assert len(tries) == 1

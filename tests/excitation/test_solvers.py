@@ -1,6 +1,5 @@
-"""Solvers against each other, and corrections of motions that are slightly broken."""
+"""How good a motion the solver finds, and corrections of motions that are slightly broken."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -21,17 +20,12 @@ from excite_cli.excitation.motion import Outcome
 from excite_cli.excitation.objective import Stack
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.excitation.progress import Progress, ProgressMeasure, Status
-from excite_cli.excitation.solvers.base import Effort, Solver
+from excite_cli.excitation.solvers.base import Effort
 from excite_cli.excitation.solvers.interior_point import InteriorPoint, damped_update
 from excite_cli.excitation.start import clear_posture, random_start
 from excite_cli.excitation.task import REACH, MotionTask
-from tests.excitation.slsqp import BestAdmissible, ScipySlsqp
 from tests.excitation.smoke import task_of
 
-MAKERS: dict[str, Callable[[], Solver]] = {
-    "interior_point": InteriorPoint,
-    "slsqp": ScipySlsqp,
-}
 PANDA = """
 robot:
   urdf: example-robot-data:panda
@@ -46,7 +40,6 @@ constraints:
   torque: {scale: 0.8}
   self_collision: {capsules: auto, margin: 0.01}
 """
-every_solver = pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
 UR10 = """
 robot: {urdf: example-robot-data:ur10}
 trajectory: {harmonics: 3}
@@ -65,10 +58,11 @@ def start(task: MotionTask, seed: int = 1) -> Array:
 
 
 def solved(
-    task: MotionTask, solver: Solver, iterations: int = 25, seconds: float = 60.0
+    task: MotionTask, iterations: int = 25, seconds: float = 60.0
 ) -> tuple[Outcome, list[Progress]]:
     seen: list[Progress] = []
-    outcome = solver.solve(task, start(task), Effort(iterations, seconds, 1e-3), seen.append)
+    effort = Effort(iterations, seconds, 1e-3)
+    outcome = InteriorPoint().solve(task, start(task), effort, seen.append)
     assert lowest(task.values(task.states(outcome.x))) > 0
     return outcome, seen
 
@@ -77,60 +71,45 @@ def condition_number(task: MotionTask, x: Array) -> float:
     return task.objective.stacked_condition_number(task.coefficients(x))
 
 
-@every_solver
-def test_max_iterations_and_progress(problem: Problem, make: Callable[[], Solver]) -> None:
-    outcome, seen = solved(MotionTask(problem), make(), iterations=5)
+def test_max_iterations_and_progress(problem: Problem) -> None:
+    outcome, seen = solved(MotionTask(problem), iterations=5)
     assert outcome.iterations == 5
     assert outcome.status is Status.ITERATION_LIMIT
     assert [progress.iteration for progress in seen] == [1, 2, 3, 4, 5]
     assert all(1 <= progress.stage.number <= progress.stage.total for progress in seen)
     assert {progress.figure.measure for progress in seen} == {ProgressMeasure.CONDITION_NUMBER}
-    again, _ = solved(MotionTask(problem), make(), iterations=5)
+    again, _ = solved(MotionTask(problem), iterations=5)
     np.testing.assert_array_equal(outcome.x, again.x)
 
 
-@every_solver
-def test_no_time_at_all_still_gives_an_admissible_outcome(
-    problem: Problem, make: Callable[[], Solver]
+def test_no_time_at_all_still_gives_an_admissible_outcome(problem: Problem) -> None:
+    assert solved(MotionTask(problem), seconds=0.02)[0].status is Status.TIME_LIMIT
+
+
+# Condition numbers that SciPy's SLSQP reached on working sets, from the same start, after so many
+# iterations (1 December 2026; docs/decisions/interior-point-solver.md).
+OF_SLSQP = {25: 14.14, 120: 10.00}
+
+
+@pytest.mark.parametrize("iterations", OF_SLSQP)
+def test_a_motion_is_nearly_as_good_as_another_solver_finds(
+    problem: Problem, iterations: int
 ) -> None:
-    assert solved(MotionTask(problem), make(), seconds=0.02)[0].status is Status.TIME_LIMIT
-
-
-def test_solvers_agree_on_how_good_a_motion_can_be(problem: Problem) -> None:
-    """Far better than the start, and admissible, after a few steps already."""
     task = MotionTask(problem)
-    ends = []
-    for make in MAKERS.values():
-        for iterations in (25, 120):
-            x = solved(task, make(), iterations)[0].x
-            assert condition_number(task, x) < 0.5 * condition_number(task, start(task))
-        ends.append(condition_number(task, x))
-    assert ends[1] < 1.25 * ends[0]
+    outcome, seen = solved(task, iterations)
+    found = condition_number(task, outcome.x)
+    assert found <= 1.0001 * min(progress.figure.value for progress in seen)
+    assert found < 1.25 * OF_SLSQP[iterations] < 0.2 * condition_number(task, start(task))
 
 
-@every_solver
-def test_second_motion_improves_on_its_stack(problem: Problem, make: Callable[[], Solver]) -> None:
+def test_second_motion_improves_on_its_stack(problem: Problem) -> None:
     first = MotionTask(problem)
-    block = first.objective.block(first.coefficients(solved(first, make(), 15)[0].x))
+    block = first.objective.block(first.coefficients(solved(first, 15)[0].x))
     stack = Stack.empty(problem.base.rank).with_rows(block)
     second = MotionTask(problem, stack)
-    outcome, _ = solved(second, make(), 15)
+    outcome, _ = solved(second, 15)
     alone = np.linalg.svd(stack.factor, compute_uv=False)
     assert condition_number(second, outcome.x) < alone[0] / alone[-1]
-
-
-def test_restoration_brings_a_broken_motion_inside(problem: Problem) -> None:
-    task = MotionTask(problem)
-    x = start(task)
-    best = BestAdmissible(task)
-    spectrum = task.evaluation(x, problem.criterion).spectrum
-    best.offer(x, task.values(task.states(x)), spectrum)
-    resting = task.variables(problem.still(problem.robot.posture))
-    broken = resting + 3.0 * (x - resting)
-    assert lowest(task.values(task.states(broken))) < 0
-    best.offer_restored(broken)
-    assert lowest(task.values(task.states(best.kept()))) > 0
-    assert condition_number(task, best.kept()) < condition_number(task, x)
 
 
 def test_damped_update_stays_positive_definite() -> None:

@@ -29,14 +29,9 @@ from excite_cli.geometry.capsules import (
 )
 from excite_cli.geometry.link_shapes import collision_model, link_shapes, placed_shapes
 from excite_cli.robot.model import Robot, build_robot
+from tests.urdf_elements import joint, link, robot_text
 
 from .fitted_robots import capsules_of, robot_of
-
-BOX = """<robot name="box"><link name="base"/>
-<link name="arm">{collision}<inertial><mass value="1"/>
-<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="j" type="revolute"><parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>
-<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
 
 
 @pytest.fixture(autouse=True)
@@ -46,7 +41,8 @@ def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def box_robot(tmp_path: Path, collision: str):
     path = tmp_path / "box.urdf"
-    path.write_text(BOX.format(collision=collision))
+    parts = '<link name="base"/>', link("arm", shapes=collision), joint("j", ("base", "arm"))
+    path.write_text(robot_text("box", *parts))
     return build_robot(RobotSpec(urdf=str(path)))
 
 

@@ -18,37 +18,23 @@ from excite_cli.geometry.pair_tables import FAR, mesh_tables, near_at_posture
 from excite_cli.robot.capsule import Capsule
 from excite_cli.robot.model import Robot, build_robot
 from tests.constraints.test_gradients import check_gradients
-
-
-def _link(name: str, shape: str, place: str = "0 0 0") -> str:
-    moments = 'ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"'
-    return (
-        f'<link name="{name}"><inertial><mass value="1"/><inertia {moments}/></inertial>'
-        f'<collision><origin xyz="{place}"/><geometry><{shape}/></geometry></collision></link>'
-    )
+from tests.urdf_elements import box, joint, link, robot_text
 
 
 def _joint(name: str, ends: tuple[str, str], height: float, axis: str, limits: str) -> str:
-    return (
-        f'<joint name="{name}" type="revolute"><parent link="{ends[0]}"/><child link="{ends[1]}"/>'
-        f'<origin xyz="0 0 {height}"/><axis xyz="{axis}"/><limit {limits} velocity="2" '
-        'effort="5"/></joint>'
-    )
+    return joint(name, ends, f"0 0 {height}", axis, f'{limits} velocity="2" effort="5"')
 
 
 # A bar on two crossed hinges above a plate: it strikes the plate when it tilts.
-WRIST = "".join(
-    [
-        '<robot name="wrist">',
-        _link("plate", 'box size="0.2 0.2 0.05"'),
-        _joint("roll", ("plate", "cross"), 0.06, "1 0 0", 'lower="-0.9" upper="0.8"'),
-        _link("cross", 'box size="0.01 0.01 0.01"'),
-        _joint("pitch", ("cross", "bar"), 0.02, "0 1 0", 'lower="-0.9" upper="0.9"'),
-        _link("bar", 'box size="0.16 0.06 0.02"', "0.01 0 0"),
-        _joint("twist", ("bar", "far"), 0.5, "0 0 1", 'lower="-1" upper="1"'),
-        _link("far", 'sphere radius="0.02"'),
-        "</robot>",
-    ]
+WRIST = robot_text(
+    "wrist",
+    link("plate", shapes=box("0.2 0.2 0.05")),
+    _joint("roll", ("plate", "cross"), 0.06, "1 0 0", 'lower="-0.9" upper="0.8"'),
+    link("cross", shapes=box("0.01 0.01 0.01")),
+    _joint("pitch", ("cross", "bar"), 0.02, "0 1 0", 'lower="-0.9" upper="0.9"'),
+    link("bar", shapes=box("0.16 0.06 0.02", "0.01 0 0")),
+    _joint("twist", ("bar", "far"), 0.5, "0 0 1", 'lower="-1" upper="1"'),
+    link("far", shapes='<collision><geometry><sphere radius="0.02"/></geometry></collision>'),
 )
 NONE = CollisionPairs((), ())
 

@@ -14,7 +14,6 @@ from excite_cli.kernels.signatures import SIGNATURES
 
 # Any sizes that differ from each other; those of a table's knots are at least 8.
 SIZES = {letter: 2 + i for i, letter in enumerate("TBVnRrCPK")} | {"F": 12, "S": 13}
-C_TYPES = {"index_t": ctypes.c_int64, "double": ctypes.c_double}
 
 
 class Recorder:

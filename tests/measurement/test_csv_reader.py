@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from excite_cli.errors import ConfigError, FileError
-from excite_cli.measurement.csv_table import read_table
+from excite_cli.measurement.text_table import read_table
 from tests.measurement.recordings import (
     JOINTS,
     only,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from excite_cli.measurement.dataset import Run
-from excite_cli.measurement.moving import moves
+from excite_cli.measurement.stretches import moves
 from excite_cli.measurement.stuck import mask_stuck
 from tests.measurement.recordings import JOINTS, check, recorded, without_speed
 

@@ -16,7 +16,7 @@ from excite_cli.excitation.base_motion import base_motion
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.start import random_start
 from excite_cli.export.timed import instants, repeated, timed_motion
-from excite_cli.measurement.csv_table import read_table
+from excite_cli.measurement.text_table import read_table
 from excite_cli.motion_formats.base import MotionFormat
 from excite_cli.motion_formats.catalogue import MOTION_FORMATS, read_motion
 from excite_cli.motion_formats.joint_trajectory import joint_trajectory

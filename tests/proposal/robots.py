@@ -4,34 +4,28 @@ from pathlib import Path
 
 from excite_cli.robot.description import load_description
 from excite_cli.robot.urdf_joints import UrdfSurvey, survey
+from tests import urdf_elements
 
-INERTIAL = (
-    '<inertial><origin xyz="0 0 0.1"/><mass value="{mass}"/>'
-    '<inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>'
-)
-BOX = (
-    '<collision><origin xyz="0 0 0.12"/><geometry><box size="0.05 0.05 0.16"/></geometry>'
-    "</collision>"
-)
+BOX = urdf_elements.box("0.05 0.05 0.16", "0 0 0.12")
 
 
 def link(name: str, mass: float = 1.0, shape: str = BOX) -> str:
-    inertial = INERTIAL.format(mass=mass) if mass >= 0 else ""
-    return f'<link name="{name}">{inertial}{shape}</link>'
+    """With a negative mass without inertial properties."""
+    if mass < 0:
+        return f'<link name="{name}">{shape}</link>'
+    return urdf_elements.link(name, mass, "0.01 0.01 0.01", "0 0 0.1", shape)
 
 
 def joint(
     name: str, parent: str, child: str, limit: str = "", kind: str = "revolute", more: str = ""
 ) -> str:
-    limits = f"<limit {limit}/>" if limit else ""
     axis = "0 0 1" if kind == "continuous" else "0 1 0"
-    return (
-        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-        f'<origin xyz="0 0 0.25"/><axis xyz="{axis}"/>{limits}{more}</joint>'
+    return urdf_elements.joint(
+        name, (parent, child), "0 0 0.25", axis, limits=limit, kind=kind, more=more
     )
 
 
-GOOD = 'lower="-2" upper="2" velocity="3" effort="50"'
+GOOD = urdf_elements.LIMITS
 
 
 def arm(folder: Path, first: str = GOOD, second: str = GOOD, mass: float = 1.0) -> Path:
@@ -56,7 +50,7 @@ def serial(folder: Path, names: str, *more: str, **own: str) -> Path:
 
 def written(folder: Path, *parts: str) -> Path:
     path = folder / "robot.urdf"
-    path.write_text('<robot name="robot">' + "".join(parts) + "</robot>", encoding="utf-8")
+    path.write_text(urdf_elements.robot_text("robot", *parts), encoding="utf-8")
     return path
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from excite_cli.config.robot_spec import RobotSpec
 from excite_cli.robot.model import Array, Robot, build_robot
+from tests.urdf_elements import joint, link, robot_text
 
 Rows = tuple[Literal["joints", "base"], ...]
 ROW_CHOICES: tuple[Rows, ...] = (("base", "joints"), ("base",), ("joints",))
@@ -57,15 +58,14 @@ def random_urdf(
         axis = rng.normal(size=3) if rng.random() < 0.5 else np.eye(3)[rng.integers(3)]
         lower, upper = -rng.uniform(0.3, 2.5), rng.uniform(0.3, 2.5)
         parts.append(_link(rng, k))
-        parts.append(
-            f'<joint name="joint_{k}" type="{kind}"><parent link="link_{parent}"/>'
-            f'<child link="link_{k}"/><axis xyz="{_text(axis / np.linalg.norm(axis))}"/>'
-            f'<origin xyz="{_text(rng.uniform(-0.5, 0.5, 3))}" '
-            f'rpy="{_text(rng.uniform(-3, 3, 3))}"/>'
-            f'<limit lower="{lower}" upper="{upper}" velocity="{rng.uniform(0.5, 4)}" '
-            f'effort="{rng.uniform(10, 200)}"/></joint>'
+        place, turn = _text(rng.uniform(-0.5, 0.5, 3)), _text(rng.uniform(-3, 3, 3))
+        limits = (
+            f'lower="{lower}" upper="{upper}" velocity="{rng.uniform(0.5, 4)}" '
+            f'effort="{rng.uniform(10, 200)}"'
         )
-    return '<robot name="random">' + "\n".join(parts) + "</robot>"
+        ends, along = (f"link_{parent}", f"link_{k}"), _text(axis / np.linalg.norm(axis))
+        parts.append(joint(f"joint_{k}", ends, place, along, limits, kind, turn))
+    return robot_text("random", *parts)
 
 
 def _link(rng: np.random.Generator, k: int) -> str:
@@ -74,14 +74,9 @@ def _link(rng: np.random.Generator, k: int) -> str:
     root = rng.normal(size=(3, 3)) * 0.1
     second_moments = mass * root @ root.T
     inertia = np.trace(second_moments) * np.eye(3) - second_moments
-    entries = " ".join(
-        f'i{"xyz"[r]}{"xyz"[c]}="{inertia[r, c]}"' for r in range(3) for c in range(r, 3)
-    )
-    return (
-        f'<link name="link_{k}"><inertial><origin xyz="{_text(rng.uniform(-0.3, 0.3, 3))}" '
-        f'rpy="{_text(rng.uniform(-3, 3, 3))}"/><mass value="{mass}"/><inertia {entries}/>'
-        "</inertial></link>"
-    )
+    moments = _text(inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
+    center, turn = _text(rng.uniform(-0.3, 0.3, 3)), _text(rng.uniform(-3, 3, 3))
+    return link(f"link_{k}", mass, moments, center, turn=turn)
 
 
 def _text(values: Array) -> str:

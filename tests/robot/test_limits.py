@@ -33,11 +33,12 @@ from excite_cli.robot.overview import describe
 from excite_cli.robot.tree import skeleton_of
 from excite_cli.robot.urdf_joints import survey
 from excite_cli.shown.note import Level
-from excite_cli.summary.problem import problem_notes
+from excite_cli.summary.problem_notes import problem_notes
 from tests.proposal.robots import GOOD, joint, link, serial, written
 from tests.robot.coupled_robots import CLAW, HAND, coupled_robot, urdf_of
 from tests.robot.formats.test_sdf import joint as sdf_joint
 from tests.robot.formats.test_sdf import link as sdf_link
+from tests.urdf_elements import robot_text
 
 KINDS = {"revolute": "hinge", "prismatic": "slide"}
 
@@ -51,7 +52,7 @@ def urdf(lower: float, upper: float, kind: str) -> str:
         joint("odd", "upper", "tip", limit, kind),
         link("tip"),
     ]
-    return '<robot name="robot">' + "".join(parts) + "</robot>"
+    return robot_text("robot", *parts)
 
 
 def xacro(lower: float, upper: float, kind: str) -> str:

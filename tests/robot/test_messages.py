@@ -13,32 +13,30 @@ from excite_cli.config.trajectory_spec import GridSpec, SamplingSpec
 from excite_cli.errors import ConfigError, RobotError
 from excite_cli.excitation.problem import Problem, build_problem
 from excite_cli.robot.model import Robot, build_robot
+from tests import urdf_elements
 
-LIMIT = '<limit lower="-1" upper="1" velocity="2" effort="10"/>'
+LIMITS = 'lower="-1" upper="1" velocity="2" effort="10"'
+LIMIT = f"<limit {LIMITS}/>"
 CYLINDER = '<collision><geometry><cylinder radius="0.05" length="0.2"/></geometry></collision>'
 # A mesh of one tetrahedron.
 OBJ = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 
 
 def link(name: str, collision: str = CYLINDER) -> str:
-    return (
-        f'<link name="{name}"><inertial><origin xyz="0.1 0 0.1"/><mass value="1"/><inertia '
-        f'ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>{collision}</link>'
-    )
+    return urdf_elements.link(name, 1, "0.1 0.1 0.1", "0.1 0 0.1", collision)
 
 
 def joint(name: str, parent: str, child: str, kind: str = "revolute", inside: str = LIMIT) -> str:
-    return (
-        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-        f'<origin xyz="0 0 0.5"/><axis xyz="0 1 0"/>{inside}</joint>'
+    return urdf_elements.joint(
+        name, (parent, child), "0 0 0.5", "0 1 0", limits="", kind=kind, more=inside
     )
 
 
 def urdf(kind: str = "revolute", inside: str = LIMIT, collision: str = CYLINDER) -> str:
     """Base, arm and hand; the first joint, `elbow`, and the hand's shape as given."""
-    parts = link("base") + link("arm") + link("hand", collision)
-    joints = joint("elbow", "base", "arm", kind, inside) + joint("wrist", "arm", "hand")
-    return f'<robot name="arm">{parts}{joints}</robot>'
+    links = link("base"), link("arm"), link("hand", collision)
+    joints = joint("elbow", "base", "arm", kind, inside), joint("wrist", "arm", "hand")
+    return urdf_elements.robot_text("arm", *links, *joints)
 
 
 def built(folder: Path, text: str, **robot: Any) -> Robot:

@@ -16,7 +16,7 @@ from excite_cli.report.posture_chart import robot_chart
 from excite_cli.robot.tree import skeleton_of
 from excite_cli.shown.answer import Page
 from excite_cli.summary.assembly import Source, page_of
-from excite_cli.summary.robot_shape import faces_of
+from excite_cli.summary.error_by_joint import faces_of
 from excite_cli.summary.status import diagnosis_figures
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis
 from tests.report.case import Case

@@ -70,17 +70,6 @@ def test_a_place_that_cannot_be_written_is_told_before_the_work(
     assert {each.name for each in tmp_path.iterdir()} == {"file"}
 
 
-def test_a_full_disk_under_stdout_is_told(cache: Path) -> None:
-    with Path("/dev/full").open("w") as full:
-        run = subprocess.run(
-            [*EXCITE, "schema"], stdout=full, stderr=subprocess.PIPE, text=True, check=False,
-            env=environment(cache), stdin=subprocess.DEVNULL,
-        )  # fmt: skip
-    assert run.returncode == 2
-    assert run.stderr.startswith("error: standard output: no space is left on the disk.")
-    assert run.stderr.count("\n") == 1
-
-
 def test_a_file_that_outgrows_its_limit_leaves_the_old_one(excite: Installed) -> None:
     (excite.folder / "s.json").write_text("old")
     limited = ["bash", "-c", f'trap "" XFSZ; ulimit -f 8; exec {EXCITE[0]} "$@"', "excite"]

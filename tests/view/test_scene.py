@@ -14,15 +14,9 @@ from excite_cli.view.geometry import robot_bodies
 from excite_cli.view.scene import Scene, build_scene
 from excite_cli.view.surface import box_triangles
 from excite_cli.view.translucent import wall_surface
+from tests.urdf_elements import joint, link, robot_text
 from tests.view.small_meshes import CORNERS, MESH, QUARTER_ABOUT_X, write_collada, write_gltf
 
-INERTIAL = (
-    '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
-    "</inertial>"
-)
-URDF = f"""<robot name="r"><link name="a">{INERTIAL}{{}}</link><link name="b">{INERTIAL}{{}}</link>
-<joint name="j" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0 0 0.5"/>
-<axis xyz="0 1 0"/><limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>"""
 SPHERE = '<geometry><sphere radius="0.1"/></geometry>'
 BOX = '<geometry><box size="0.2 0.2 0.2"/></geometry>'
 ROUND = f"<collision>{SPHERE}</collision>"
@@ -37,7 +31,9 @@ def scene(problem: Problem, segment: Segment) -> Scene:
 
 def _robot(folder: Path, first: str, second: str) -> Robot:
     """With these shapes on its two links."""
-    (folder / "robot.urdf").write_text(URDF.format(first, second))
+    links = link("a", shapes=first), link("b", shapes=second)
+    text = robot_text("r", *links, joint("j", ("a", "b"), "0 0 0.5", "0 1 0"))
+    (folder / "robot.urdf").write_text(text)
     return build_robot(RobotSpec(urdf="robot.urdf"), folder)
 
 

@@ -153,7 +153,7 @@ class _Run:
         for number, (mu, step, change) in wanted:
             criterion = steps[min(step, len(steps) - 1)]
             change = max(change, self.effort.tolerance)
-            stage = Stage(number + 1, len(_STAGES), mu)
+            stage = Stage(number + 1, len(_STAGES))
             try:
                 x, status = self.stage(x, criterion, mu, change, stage)
             except KeyboardInterrupt:

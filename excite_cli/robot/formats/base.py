@@ -94,6 +94,15 @@ class RobotFormat(ABC):
 
 Element = ElementTree.Element
 
+# Attributes of <inertia>, and where they stand in a tensor.
+INERTIA_ENTRIES = (
+    ("ixx", 0, 0),
+    ("ixy", 0, 1),
+    ("ixz", 0, 2),
+    ("iyy", 1, 1),
+    ("iyz", 1, 2),
+    ("izz", 2, 2),
+)
 _BALL_POINTS = 200
 
 
@@ -124,9 +133,7 @@ def add_inertial(link: Element, mass: float, place: Array, inertia: Array) -> No
     inertial = ElementTree.SubElement(link, "inertial")
     add_origin(inertial, place, np.eye(3))
     ElementTree.SubElement(inertial, "mass", value=repr(mass))
-    names = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 1, 2),
-             ("izz", 2, 2))  # fmt: skip
-    figures = {name: repr(float(inertia[i, j])) for name, i, j in names}
+    figures = {name: repr(float(inertia[i, j])) for name, i, j in INERTIA_ENTRIES}
     ElementTree.SubElement(inertial, "inertia", figures)
 
 

@@ -16,7 +16,7 @@ from typing import Any
 from excite_cli.errors import RobotError
 from excite_cli.robot.allowed_files import AllowedFiles
 from excite_cli.robot.mesh_trial import MAX_BYTES
-from excite_cli.robot.urdf_check import tree_of
+from excite_cli.robot.urdf_check import tree_of, xml_text
 
 # Ranges of MJCF joints, also those that MuJoCo refuses or passes over: equal and reversed ones.
 #
@@ -58,7 +58,6 @@ _FOLDERS = ("meshdir", "texturedir", "assetdir")
 _MODELS = ("include", "model")
 _MOST, _MOST_INCLUDED = 2000, 100  # names of files; files that are read here
 _MAX_TOTAL = 2**30  # bytes of all files, whose content is what a kept conversion is found by
-_MAX_INCLUDED = 20_000_000  # bytes of an included file
 
 
 def mjcf_sources(path: Path, text: str, allowed: AllowedFiles) -> tuple[Path, ...] | None:
@@ -85,7 +84,7 @@ def mjcf_sources(path: Path, text: str, allowed: AllowedFiles) -> tuple[Path, ..
             break
         if len(roots) + len(more) > _MOST_INCLUDED:
             raise RobotError(f"{path.name}: it includes more than {_MOST_INCLUDED} files.")
-        roots |= {each: tree_of(each, _text(each)) for each in sorted(more)}
+        roots |= {each: tree_of(each, xml_text(each, "an MJCF")) for each in sorted(more)}
     names = _names(elements)
     if len(names) > _MOST:
         raise RobotError(f"{path.name}: it names more than {_MOST} files.")
@@ -151,15 +150,3 @@ def _check_sizes(path: Path, files: set[Path]) -> None:
             f"{sizes[largest] / 2**20:.0f} MiB); {MAX_BYTES // 2**20} MiB each and "
             f"{_MAX_TOTAL // 2**20} MiB together are read."
         )
-
-
-def _text(path: Path) -> str:
-    if path.stat().st_size > _MAX_INCLUDED:
-        raise RobotError(f"{path} is larger than {_MAX_INCLUDED // 10**6} MB.")
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise RobotError(f"{path} cannot be read as text: {error}") from error
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise RobotError(f"{path} declares a document type or entities; an MJCF needs neither.")
-    return text

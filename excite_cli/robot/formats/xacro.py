@@ -20,11 +20,11 @@ from excite_cli.robot.allowed_files import AllowedFiles, OutsideError, allowed_f
 from excite_cli.robot.formats import xacro_expression
 from excite_cli.robot.formats.base import ConversionRequest, RobotFormat, Urdf
 from excite_cli.robot.ros_packages import MissingPackageError, find_package, unnamed_package
+from excite_cli.robot.urdf_check import xml_text
 
 _NAMESPACE = re.compile(r"xmlns:xacro\s*=")
 _VARIABLES = ("ROS_DISTRO", "ROS_VERSION")  # of the environment, that a file may ask for
 _OF_ARGUMENTS = " Arguments are given under robot.xacro_args (init: --xacro-arg NAME=VALUE)."
-_MAX_BYTES = 20_000_000  # of an included file
 # What is replaced in the library: where one is missing, it is a version that nobody has tried.
 _REPLACED = ("safe_eval", "parse", "load_yaml", "glob", "_global_symbols", "process_file")
 _REPLACED_SUBSTITUTIONS = ("_eval", "_eval_env", "_eval_optenv", "_eval_find", "convert_value")
@@ -66,7 +66,7 @@ class Xacro(RobotFormat):
             own = _own_error(error)
             if isinstance(own, (OutsideError, MissingPackageError)):
                 raise own from error
-            reason = " ".join(str(own or error).split()) or type(error).__name__
+            reason = " ".join(str(own or error).split()).rstrip(".") or type(error).__name__
             advice = _OF_ARGUMENTS if "rgument" in reason else ""
             raise RobotError(
                 f"{path.name}: xacro cannot expand it: {reason[:600]}.{advice}"
@@ -144,7 +144,9 @@ def _functions_of_xacro(library: Any, allowed: AllowedFiles) -> dict[str, Any]:
 
     def load_yaml(name: str) -> Any:
         path = allowed.require(Path(library.abs_filename_spec(name)))
-        _text(path)  # of a size that may be read
+        if not path.is_file():
+            raise RobotError(f"there is no file {path}")
+        xml_text(path, "a table of a xacro")  # of a size that may be read
         return read_table(str(path))
 
     def argument(name: str) -> Any:
@@ -173,7 +175,7 @@ def _parsed(library: Any, allowed: AllowedFiles, given: None, name: str) -> Any:
     if not path.is_file():  # the library passes over an include that is optional
         library.filestack.pop()
         raise library.XacroException(f"there is no file {path}", exc=FileNotFoundError())
-    document: Any = minidom.parseString(_text(path))
+    document: Any = minidom.parseString(xml_text(path, "a xacro"))
     for element in document.documentElement.childNodes:
         old = element.nodeName in ("property", "include") and element.hasAttribute(
             "value" if element.nodeName == "property" else "filename"
@@ -193,21 +195,6 @@ class _Patterns:
         """The files that a pattern means."""
         self.allowed.require(Path(re.split(r"[*?\[]", pattern)[0] + "_").parent)
         return glob.glob(pattern)
-
-
-def _text(path: Path) -> str:
-    """The text of a file that may be read; XML of it has no document type."""
-    if not path.is_file():
-        raise RobotError(f"there is no file {path}")
-    if path.stat().st_size > _MAX_BYTES:
-        raise RobotError(f"{path} is larger than {_MAX_BYTES // 10**6} MB")
-    try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise RobotError(f"{path} is not UTF-8: {error.reason}") from error
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise RobotError(f"{path} declares a document type or entities")
-    return text
 
 
 def _own_error(error: BaseException) -> RobotError | None:

@@ -9,6 +9,7 @@ from excite_cli.api.loading import load_problem
 from excite_cli.dynamics.base_parameters import find_base_parameters
 from excite_cli.dynamics.regressor import Regressor, standard_parameters
 from excite_cli.robot.model import Robot
+from tests.urdf_elements import joint, link, robot_text
 
 LENGTHS, MASSES = (0.31, 0.27, 0.13), (3.1, 1.7, 0.6)
 AXES = ("0 0 1", "0 1 0", "1 0 0")
@@ -16,20 +17,13 @@ INERTIA = (0.021, 0.017, 0.006, 0.001, -0.002, 0.0005)  # ixx, iyy, izz, ixy, ix
 
 
 def _urdf() -> str:
-    parts, above = ['<robot name="one"><link name="base"/>'], "base"
-    at = 0.1
-    names = dict(zip(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), INERTIA, strict=True))
-    inertia = " ".join(f'{key}="{value}"' for key, value in names.items())
+    parts, above, at = ['<link name="base"/>'], "base", 0.1
+    moments, limits = " ".join(map(str, INERTIA)), 'lower="-1" upper="1.5" velocity="2" effort="50"'
     for k, (length, mass, axis) in enumerate(zip(LENGTHS, MASSES, AXES, strict=True)):
-        parts.append(
-            f'<link name="l{k}"><inertial><origin xyz="0.01 -0.02 {length / 2}"/>'
-            f'<mass value="{mass}"/><inertia {inertia}/></inertial></link>'
-            f'<joint name="j{k}" type="revolute"><parent link="{above}"/><child link="l{k}"/>'
-            f'<origin xyz="0 0 {at}"/><axis xyz="{axis}"/>'
-            '<limit lower="-1" upper="1.5" velocity="2" effort="50"/></joint>'
-        )
+        parts.append(link(f"l{k}", mass, moments, f"0.01 -0.02 {length / 2}"))
+        parts.append(joint(f"j{k}", (above, f"l{k}"), f"0 0 {at}", axis, limits))
         above, at = f"l{k}", length
-    return "".join([*parts, "</robot>"])
+    return robot_text("one", *parts)
 
 
 def _xacro() -> str:
@@ -66,10 +60,10 @@ def _sdf(form: str) -> str:
     names = dict(zip(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), INERTIA, strict=True))
     inertia = "".join(f"<{key}>{value}</{key}>" for key, value in names.items())
     for k, (length, mass, axis) in enumerate(zip(LENGTHS, MASSES, AXES, strict=True)):
-        joint = pin.SE3(np.eye(3), np.array([0.0, 0.0, at]))
+        here = pin.SE3(np.eye(3), np.array([0.0, 0.0, at]))
         centre = pin.SE3(np.eye(3), np.array([0.01, -0.02, length / 2]))
         parts.append(
-            f'<link name="l{k}">{_pose(joint * askew)}<inertial>{_pose(askew.inverse() * centre)}'
+            f'<link name="l{k}">{_pose(here * askew)}<inertial>{_pose(askew.inverse() * centre)}'
             f"<mass>{mass}</mass><inertia>{inertia}</inertia></inertial></link>"
             f'<joint name="j{k}" type="revolute"><parent>{above}</parent><child>l{k}</child>'
             f"{_pose(askew.inverse())}<axis><xyz>{axis}</xyz><limit><lower>-1</lower>"

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from excite_cli.campaign.command import MeasureCommand
 from excite_cli.campaign.measure import NotMeasuredError
+from excite_cli.campaign.measure_command import MeasureCommand
 from excite_cli.errors import ConfigError
 from tests.campaign.campaign_process import program, said, take_in, until
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from excite_cli.config.load_spec import parse_spec
 from excite_cli.excitation.problem import build_problem
 from excite_cli.shown.note import Level
-from excite_cli.summary.problem import problem_notes
+from excite_cli.summary.problem_notes import problem_notes
 from tests.proposal.robots import GOOD, joint, link, serial
 
 

@@ -1,7 +1,8 @@
 """What was seen of log and model before any physics, check by check."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from dataclasses import dataclass, field
+from typing import Any
 
 from excite_cli.checks.check_result import CheckResult
 from excite_cli.checks.sentences import written
@@ -16,6 +17,7 @@ from excite_cli.shown.answer import (
     Part,
     Parts,
     Section,
+    Shown,
     Table,
     Text,
     as_word,
@@ -64,32 +66,28 @@ show(Dataset, lambda data: f"{len(data.joint_names)} joints; {runs_in_words(data
 show(Run, _run_in_words, lambda run: [_run_table("Run", [run])])
 
 
-class AnyInspection(Protocol):
-    """An inspection."""
+@dataclass(frozen=True, repr=False)
+class LogInspection(Shown):
+    """`results` in the order of the checks; `settings`: what would change in the config.
 
-    @property
-    def results(self) -> tuple[CheckResult, ...]:
-        """Of every check."""
+    `power`: sizes of effects that a diagnosis would name with 95 %, if they were asked for, of
+    torques with this `noise`.
+    """
 
-    @property
-    def settings(self) -> Mapping[str, Any]:
-        """What would change in the config."""
-
-    @property
-    def power(self) -> tuple[EffectPower, ...]:
-        """Sizes of effects that a diagnosis would name, where they were asked for."""
-
-    @property
-    def noise(self) -> str:
-        """In words, the noise of torques that these sizes belong to."""
+    results: tuple[CheckResult, ...]
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    runs: tuple[str, ...] = ()
+    power: tuple[EffectPower, ...] = ()
+    noise: str = ""
 
     @property
     def good(self) -> bool:
         """Whether nothing is wrong for certain."""
+        return all(each.status != "fault" for each in self.results)
 
 
 def inspection_answer(
-    found: AnyInspection,
+    found: LogInspection,
     config: str = "",
     data: tuple[str, ...] = (),
     applied: str | None = None,
@@ -100,12 +98,12 @@ def inspection_answer(
     return Answer((*parts,), {**_data(found, applied), "page": page}, found.good)
 
 
-def inspection_parts(found: AnyInspection) -> list[Part]:
+def inspection_parts(found: LogInspection) -> list[Part]:
     """The headline, the rows, and the evidence of what is not fine."""
     return _parts(found, "", (), {})
 
 
-def checks_table(found: AnyInspection) -> Table:
+def checks_table(found: LogInspection) -> Table:
     """A row for every check: its status, its joints, and what settles it."""
     rows = (
         {
@@ -121,7 +119,7 @@ def checks_table(found: AnyInspection) -> Table:
     return Table.of("Set-up checks", rows, left=("check", "status"), words=words, bold=bold)
 
 
-def remarks(found: AnyInspection) -> list[str]:
+def remarks(found: LogInspection) -> list[str]:
     """The evidence: of faults, then of doubts, then what was repaired."""
     texts = []
     for status, lead in (("fault", "fault: "), ("doubt", "doubt: "), ("ok", "")):
@@ -135,7 +133,7 @@ def remarks(found: AnyInspection) -> list[str]:
 
 
 def _parts(
-    found: AnyInspection, config: str, data: tuple[str, ...], written_to: Mapping[str, str | None]
+    found: LogInspection, config: str, data: tuple[str, ...], written_to: Mapping[str, str | None]
 ) -> list[Part]:
     parts: list[Part] = [headline(found), checks_table(found), *remarks(found)]
     if found.power:
@@ -163,7 +161,7 @@ def _where(result: CheckResult) -> str:
     return f"{result.runs}: " if result.runs else ""
 
 
-def headline(found: AnyInspection) -> str:
+def headline(found: LogInspection) -> str:
     """One sentence."""
     faults, doubts, count = counted(found)
     if faults:
@@ -175,14 +173,14 @@ def headline(found: AnyInspection) -> str:
     return f"No faults and no doubts: {count} checks."
 
 
-def counted(found: AnyInspection) -> tuple[int, int, int]:
+def counted(found: LogInspection) -> tuple[int, int, int]:
     """Checks with a fault, others with a doubt, all: the worse one counts where both were found."""
     faulty = {each.name for each in found.results if each.status == "fault"}
     doubted = {each.name for each in found.results if each.status == "doubt"} - faulty
     return len(faulty), len(doubted), len({each.name for each in found.results})
 
 
-def _data(found: AnyInspection, applied: str | None) -> dict[str, Any]:
+def _data(found: LogInspection, applied: str | None) -> dict[str, Any]:
     """The answer for `--json`."""
     own = ("name", "status", "joints", "runs", "evidence", "settings")
     return {
@@ -196,7 +194,7 @@ def _data(found: AnyInspection, applied: str | None) -> dict[str, Any]:
     }
 
 
-def inspection_page(found: AnyInspection, title: str) -> Page:
+def inspection_page(found: LogInspection, title: str) -> Page:
     """The table of all checks, the evidence of what is not fine, and what would be set."""
     faults, doubts, _ = counted(found)
     rows = tuple((key, written({key: value})) for key, value in found.settings.items())
@@ -217,3 +215,6 @@ def inspection_page(found: AnyInspection, title: str) -> Page:
         tuple(section for section in sections if section.blocks),
         (Text(headline(found), "good" if found.good else "bad"),),
     )
+
+
+show(LogInspection, headline, inspection_parts)
