@@ -199,7 +199,7 @@ def diagnose(
                 effect_parameter_names((*model.declared, *traced.effects), robot.joint_names),
                 final.seen[base.rank :],
             ),
-            *_noticed(assumed, floor, robot, parts.training),
+            *_noticed(assumed, floor, robot, parts),
         ),
         processing=_choices(processing, traced, parts, training),
         phi=model.full_inertias(final.parameters),
@@ -303,20 +303,23 @@ def _noticed(
     assumed: Sequence[Assumption],
     floor: NoiseFloor | None,
     robot: Robot,
-    training: Sequence[Run],
+    parts: Split,
 ) -> Iterator[Finding]:
     for each in assumed:
         yield Finding("assumed", "warning", assumption_in_words(each))
     if floor is not None:
         yield from floor.noticed(robot.joint_names)
-    if len({run.name for run in training}) == 1:
-        yield Finding(
-            "one run",
-            "warning",
-            f"Only one recording, '{training[0].name}': training and held-out data share a motion, "
-            "so spurious effects may pass. Record a second motion.",
-            training[0].name,
+    name, *others = {run.name for run in parts.training}
+    if not others:
+        shared = any(run.name == name for run in parts.held_out)
+        text = (
+            f"Only one recording, '{name}': training and held-out data share a motion, so spurious "
+            "effects may pass. Record a second motion."
+            if shared
+            else f"Only one training recording, '{name}': what is different in "
+            f"{parts.held_out_name} passes for an error of the model. Record a third one."
         )
+        yield Finding("one run", "warning", text, name)
 
 
 def _filter_bias(

@@ -104,17 +104,20 @@ class DahlFriction(Effect):
 
     def shapes_near(self, signals: Sequence[Signals]) -> list[dict]:
         """Without a damping, some with one; with one, none, and both shapes changed at once."""
-        near = super().shapes_near(signals)
+        widest = _DISTANCES[1]
+        near = [each for each in super().shapes_near(signals) if each["distance"] <= widest]
         distance, known = self.shape["distance"], self._damping
         if known:
             both = [(a * distance, b * known) for a in _RATIOS for b in _RATIOS]
-            return near + [{"distance": d, "damping": r} for d, r in [*both, (distance, 0.0)]]
+            return near + [
+                {"distance": d, "damping": r} for d, r in [*both, (distance, 0.0)] if d <= widest
+            ]
         reversing = np.sqrt(2.0 * self._acceleration(signals) * distance)
         return near + [
             {"distance": longer * distance, "damping": float(damping / reversing)}
             for longer in _LONGER
             for damping in _DAMPINGS
-            if reversing > 0.0
+            if reversing > 0.0 and longer * distance <= widest
         ]
 
     def _acceleration(self, signals: Sequence[Signals]) -> float:

@@ -62,6 +62,17 @@ def test_a_robot_with_one_moved_joint() -> None:
     assert dry_friction(found)[0] == pytest.approx(3.0, rel=0.1)
 
 
+@pytest.mark.parametrize(
+    ("runs", "words"), [(1, "share a motion"), (2, "is different in"), (3, "")]
+)
+def test_what_one_recording_cannot_say(runs: int, words: str) -> None:
+    data = recorded("elbow")
+    found = diagnose(case("robot.joints=[elbow]"), replace(data, runs=data.runs[:runs]))
+    texts = [each.text for each in found.findings if each.kind == "one run"]
+    assert len(texts) == bool(words)
+    assert all(words in text for text in texts)
+
+
 def test_friction_of_a_joint_that_turned_one_way_is_an_offset_as_well() -> None:
     def one_way(run: Run) -> Run:
         return replace(run, valid=np.gradient(run.q, run.t, axis=0) > 0.02)

@@ -110,6 +110,18 @@ def test_distances_follow_the_travelled_range() -> None:
     assert [s["distance"] for s in DahlFriction.grid(ROBOT, (0,), [still])] == [5e-4]
 
 
+@pytest.mark.parametrize("damping", [0.0, 0.3])
+def test_what_builds_up_over_more_than_half_a_radian_is_a_spring(damping: float) -> None:
+    """1.26 rad of it stood for the weight of a link, beside friction of thrice its size."""
+    still = swinging(0.02)
+    signals = Signals(**{**vars(still), "a": np.full_like(still.q, 3.0)})
+    for distance in (0.01, 0.3, 0.5):
+        near = DahlFriction((0,), {"distance": distance, "damping": damping}).shapes_near([signals])
+        assert near
+        assert max(each["distance"] for each in near) <= 0.5
+    assert max(each["distance"] for each in near) == pytest.approx(0.5)
+
+
 @pytest.mark.parametrize("damping", [0.0, 2.0])
 def test_pull_back_goes_through_turning_points(damping: float) -> None:
     """With the narrow sign of measured data, on steps that are long against it."""
