@@ -143,7 +143,7 @@ def campaign(
             retries=retries,
             resume=resume,
             workers=place,
-            progress=start_line(line, case.spec),
+            progress=start_line(line, case.spec, counted=False),
             tell=terminal.tell,
         )
     terminal.show(campaign_answer(found, output, {"model": MODEL, "page": PAGE}))

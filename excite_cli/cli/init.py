@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from excite_cli.cli import options
-from excite_cli.cli.console import Terminal
+from excite_cli.cli.console import Terminal, asking
 from excite_cli.errors import ConfigError, RobotError, nearest
 
 if TYPE_CHECKING:
@@ -114,7 +114,8 @@ def init(
         answers = _Answers(str(urdf), output, chosen)
     elif interactive:
         own = package_dirs or ()
-        answers = _ask(output, chosen, lambda each: limbs_of(each, own, arguments, allow))
+        with asking():
+            answers = _ask(output, chosen, lambda each: limbs_of(each, own, arguments, allow))
     else:
         raise ConfigError(
             "init needs a robot: --robot NAME (`excite robots` lists them) or --urdf FILE. At "
@@ -173,7 +174,8 @@ def _may_read(allow_found: bool, at_terminal: bool) -> "Allow":
             return allow_found and needed.near
         if str(needed) not in answers:
             question = f"Read {needed.folder}? The robot asks for {needed}, outside its own folder."
-            answers[str(needed)] = typer.confirm(question, default=False, err=True)
+            with asking():
+                answers[str(needed)] = typer.confirm(question, default=False, err=True)
         return answers[str(needed)]
 
     return allow

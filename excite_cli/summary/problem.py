@@ -114,7 +114,7 @@ def problem_parts(problem: Problem) -> Parts:
 
 def _heard(problem: Problem) -> list[str]:
     notes = problem_notes(problem)
-    return [note.sentence for note in notes if note.level is not Level.DETAIL]
+    return [note.sentence for note in notes if note.level.value > Level.DETAIL.value]
 
 
 def _said(text: str) -> Note:
