@@ -67,13 +67,18 @@ class Terminal:
         else:
             self.say(note.sentence)
 
-    def show(self, answer: Answer) -> None:
-        """The answer, as JSON or as tables and sentences; exit status 1 where it is bad."""
+    def show(self, answer: Answer, following: Sequence[Part] = ()) -> None:
+        """The answer, as JSON or as tables and sentences; exit status 1 where it is bad.
+
+        `following`: what to do next, which is no answer, and not said where only that is wanted.
+        """
         _shown[-1].stop()
         if self.as_json:
-            print(json.dumps(_finite(answer.data), ensure_ascii=not is_unicode(sys.stdout)))
+            lines = [part.line for part in following if isinstance(part, Command)]
+            data = answer.data | ({"next": lines} if lines else {})
+            print(json.dumps(_finite(data), ensure_ascii=not is_unicode(sys.stdout)))
         else:
-            self._print(answer.parts)
+            self._print((*answer.parts, *(() if self.quiet else following)))
         if not answer.good:
             raise typer.Exit(1)
 

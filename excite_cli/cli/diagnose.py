@@ -73,4 +73,4 @@ def diagnose(
             ended=ended,
         )
     written = {"diagnosis": output, "config": apply if found.good or apply_unconfirmed else None}
-    terminal.show(diagnosis_answer(found, str(config), written, terminal.verbose))
+    terminal.show(diagnosis_answer(found, str(config), written, terminal.verbose, data))

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from excite_cli.api.showing import Command, as_word
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal, asking
+from excite_cli.cli.next_step import next_step
 from excite_cli.errors import ConfigError, RobotError, nearest
 
 if TYPE_CHECKING:
@@ -138,7 +140,11 @@ def init(
         overwrite=overwrite,
         tell=terminal.tell,
     )
-    terminal.show(answer)
+    written = Path(answer.data["output"])
+    following = next_step("plan motions, or check a recording that you have", "optimize", written)
+    terminal.show(
+        answer, (*following, Command(("excite", "inspect", as_word(written), "DATA.csv")))
+    )
 
 
 def _pairs(words: Sequence[str]) -> dict[str, str]:

@@ -55,7 +55,7 @@ from excite_cli.summary.named_effects import (
     other_names,
     what_and_where,
 )
-from excite_cli.summary.status import purpose
+from excite_cli.summary.status import purpose, set_up_is_open
 
 _WORTH = 0.01  # share of the residual from which on a quantity is told
 _MOST_QUANTITIES = 18
@@ -67,8 +67,9 @@ def diagnosis_answer(
     config: str,
     written: Mapping[str, str | Path | None],
     verbose: bool = False,
+    data: Sequence[str | Path] = (),
 ) -> Answer:
-    """What `excite diagnose` answers; `written` are the files that were requested, by kind.
+    """What `excite diagnose` answers of the files `data`; `written` were requested, by kind.
 
     With `verbose` also how the data were processed, every round's suspects, and small effects.
     """
@@ -79,7 +80,7 @@ def diagnosis_answer(
     if not verbose:
         rounds = counted(len(found.rounds), "round")
         parts.append(f"({rounds} of tests; --verbose shows the rejected candidates, with reasons.)")
-    parts += [*files_in_words(files), *_next(found, experiment, config, files.get("diagnosis"))]
+    parts += [*files_in_words(files), *_next(found, config, data, files.get("diagnosis"))]
     return Answer(tuple(parts), {**diagnosis_data(found, experiment), "output": files}, found.good)
 
 
@@ -226,7 +227,7 @@ def _round_table(found: Diagnosis, each: Round) -> Table:
 def _next_section(found: Diagnosis, detail: Detail) -> Section:
     """On a page; an answer has the names of files to say it with."""
     experiment = next_experiment(found)
-    lead = f"Next: plan a motion, to {purpose(experiment['purpose'], len(experiment['pairs']))}."
+    lead = f"Next: plan a motion, to {purpose(found)}."
     if detail < Detail.PAGE:
         return Section("diagnosis-next", "Next motion", (), lead)
     rows = tuple(
@@ -312,14 +313,20 @@ SECTIONS: list[Callable[[Diagnosis, Detail], Section]] = [
 ]
 
 
-def _next(found: Diagnosis, experiment: dict[str, Any], config: str, file: str | None) -> Parts:
+def _next(found: Diagnosis, config: str, data: Sequence[str | Path], file: str | None) -> Parts:
     """What to do next, with the `file` of the diagnosis: commands that can be typed."""
+    given = (as_word(config), *map(as_word, data))
+    if set_up_is_open(found):
+        return ["Next: resolve the doubt about the set-up:", Command(("excite", "inspect", *given))]
     if file is None:
-        return ["Next: repeat with -o DIAGNOSIS.h5, for a report and for the next motion."]
+        again = Command(("excite", "diagnose", *given, "-o", "DIAGNOSIS.h5"))
+        return ["Next: keep it in a file, for a report and the next motion:", again]
     if found.complete:
-        return ["Next, with other data:", Command(("excite", "score", as_word(file), "DATA.h5"))]
+        score = Command(("excite", "score", as_word(file), "DATA.h5"))
+        return ["Next: see whether the model holds for other data:", score]
     return [
-        f"Next: plan a motion, to {purpose(experiment['purpose'], len(experiment['pairs']))}:",
+        f"Next: look at the evidence; plan a motion, to {purpose(found)}:",
+        Command(("excite", "report", as_word(file))),
         next_command(config, file),
     ]
 
