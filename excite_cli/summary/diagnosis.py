@@ -18,6 +18,7 @@ from excite_cli.diagnosis.words import (
     p_in_words,
     place_in_words,
     rests_in_words,
+    title_of,
     value_in_words,
 )
 from excite_cli.fields import data_of, public_data
@@ -25,6 +26,7 @@ from excite_cli.report.residual_chart import (
     IN_TIME,
     dependence_plots,
     noise_by_joint,
+    noise_in_words,
     residuals_in_time,
 )
 from excite_cli.report.validity_chart import validity_section
@@ -98,7 +100,7 @@ def diagnosis_sections(
 ) -> list[Section]:
     """Those that have something to say, in the order of a page, which shows the `robot`."""
     every = [
-        errors_section(found, detail, robot) if make is errors_section else make(found, detail)
+        make(found, detail, robot) if robot and make in WITH_ROBOT else make(found, detail)
         for make in SECTIONS
     ]
     return [section for section in every if section.blocks]
@@ -115,8 +117,8 @@ def _time_section(found: Diagnosis, detail: Detail) -> Section:
         noise = noise_by_joint(found)
         blocks = residuals_in_time(traces, found.joint_names, found.torque_units, noise)
     lead = (
-        f"{IN_TIME} of the model with all effects and of the declared one, over the noise. Shaded: "
-        "held out."
+        f"{IN_TIME} of the model with all effects and of the declared one, over a band of "
+        f"{noise_in_words(found)}. Shaded: held out."
     )
     return Section("diagnosis-time", "Residual in time", blocks, lead)
 
@@ -206,7 +208,7 @@ def _round_table(found: Diagnosis, each: Round) -> Table:
     unit = dict(zip(found.joint_names, found.torque_units, strict=True)).get(worst, "")
     rows = (
         {
-            "candidate": suspect.effect.kind,
+            "candidate": title_of(suspect.effect.kind),
             "where": place_in_words(suspect.effect, len(found.joint_names)),
             "p": p_in_words(suspect.p_value, suspect.least_p),
             "of residual": f"{suspect.share_of_residual:.1%}",
@@ -231,7 +233,7 @@ def _next_section(found: Diagnosis, detail: Detail) -> Section:
     if detail < Detail.PAGE:
         return Section("diagnosis-next", "Next motion", (), lead)
     rows = tuple(
-        tuple(f"{each['kind']} on {', '.join(each['joints'])}" for each in pair.values())
+        tuple(f"{title_of(each['kind'])} on {', '.join(each['joints'])}" for each in pair.values())
         for pair in experiment["pairs"]
     )
     names = ("found", "indistinguishable from")
@@ -248,10 +250,14 @@ def _data_section(found: Diagnosis, detail: Detail) -> Section:
         blocks += data_blocks(found, found.joint_names, _runs(found))
     runs = ", ".join(map(str, found.processing.get("runs", ())))
     lead = (
-        f"Made by `excite diagnose` in {found.seconds:.1f} s, fitted to {runs or 'the data'}, held "
-        f"out: {found.held_out_run}. To go on with the extended model, `excite diagnose … --apply "
-        "NEW.yaml` writes this configuration with the effects that were found."
+        f"Made in {found.seconds:.1f} s by `{found.processing.get('command', 'excite diagnose')}`, "
+        f"fitted to {runs or 'the data'}, held out: {found.held_out_run}."
     )
+    if "--apply" not in str(found.processing.get("command")):
+        lead += (
+            " To go on with the extended model, `excite diagnose … --apply NEW.yaml` writes this "
+            "configuration with the effects that were found."
+        )
     return Section("diagnosis-data", "Data and choices", tuple(blocks), lead)
 
 
@@ -297,10 +303,11 @@ def _within(name: str, runs: Sequence[str]) -> bool:
 
 
 def _own(record: EffectRecord) -> str:
-    return f"{record.kind} on {', '.join(record.joints)}"
+    return f"{title_of(record.kind)} on {', '.join(record.joints)}"
 
 
-SECTIONS: list[Callable[[Diagnosis, Detail], Section]] = [
+WITH_ROBOT: tuple[Callable[..., Section], ...] = (found_section, errors_section)
+SECTIONS: list[Callable[..., Section]] = [
     found_section,
     errors_section,
     _time_section,

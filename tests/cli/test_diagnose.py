@@ -159,7 +159,7 @@ def test_the_new_config_needs_nothing_more(outcome: Outcome, excite: Program) ->
 def test_people_get_tables(outcome: Outcome, excite: Program) -> None:
     run = excite.good("diagnose", SMOKE, outcome.data, *QUICK, "--held-out", "motion_1_take_1")
     for words in (
-        "What the declared model lacks", "coulomb_friction", "N·m",
+        "What the declared model lacks", "Coulomb friction", "N·m",
         "Error of the torque on held-out data (motion_1_take_1)", "Next: keep it in a file",
     ):  # fmt: skip
         assert words in run.stdout
