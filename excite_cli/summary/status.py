@@ -103,4 +103,4 @@ def purpose(found: Diagnosis) -> str:
     if not found.effects:
         return "show more of what no effect explains"
     effects = counted(len(found.effects), "effect")
-    return f"determine the model with its {effects} more exactly"
+    return f"determine the extended model ({effects}) more exactly"
