@@ -200,7 +200,7 @@ def problem_of(case: Problem | Case, tell: Tell = log_note) -> Problem:
 
 def _built(spec: Spec, folder: Path, file: Path | None, tell: Tell) -> Problem:
     work = states_of_work(spec, folder, tell)
-    words = "base parameters, limits and collision geometry (up to a minute for a new robot)"
+    words = "base parameters, limits and collision geometry (up to two minutes for a new robot)"
     tell(Note(Level.STEP, f"preparing {words}"))
     problem = replace(build_problem(spec, folder, fit_knowledge(spec, folder), work), file=file)
     for note in problem_notes(problem):

@@ -172,7 +172,7 @@ def save_proposal(
         # A wrong name is reported at once, and what may be read is asked first.
         _, needed = load_with_folders(source, dirs, folder, xacro_args, allow)
         allowed = {each.folder for each in needed}
-        words = "fitting collision geometry (up to a minute, once), choosing posture and pace"
+        words = "fitting collision geometry (once; up to two minutes), choosing posture and pace"
         tell(Note(Level.STEP, words))
         found = propose(
             source,

@@ -116,12 +116,13 @@ def after_campaign(found: "Campaign", folder: Path, typed: Sequence[str]) -> tup
     if found.ended == "complete":
         return next_step("use the model, for example in a controller", "export", last, "-f", "c")
     if found.ended == "budget":
-        by_rounds = len(found.rounds) >= found.asked.most_rounds
-        more = (
-            ("--max-rounds", f"{2 * len(found.rounds)}")
-            if by_rounds
-            else ("--max-seconds", f"{2.0 * found.seconds:.0f}")
-        )
-        again = [*typed, *(["--resume"] * ("--resume" not in typed)), *more]
+        rounds, option = len(found.rounds), "--max-seconds"
+        more = f"{2.0 * found.seconds:.0f}"
+        if rounds >= found.asked.most_rounds:
+            option, more = "--max-rounds", f"{2 * rounds}"
+        again = list(typed)
+        while option in again[:-1]:
+            del again[again.index(option) : again.index(option) + 2]
+        again += [*(["--resume"] * ("--resume" not in typed)), option, more]
         return next_step("go on with a larger budget", *again)
     return next_step("read what could not be separated", "report", last)

@@ -150,6 +150,8 @@ class OnTerminal(Waiting):
 class _Remaining(TimeRemainingColumn):
     """The time that all steps need; the time that has passed until that is known."""
 
+    max_refresh = 0.0  # a step that begins has no time of the one before
+
     def render(self, task: Task) -> Text:
         """`≤ 0:00:12`, or `0:00:03`."""
         if task.time_remaining is None:

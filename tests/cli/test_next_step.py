@@ -93,7 +93,7 @@ INSPECT = "excite inspect CONFIG.yaml log.csv"
             ["excite export c/round_2_diagnosis.h5 -f c"],
         ),
         (
-            step.after_campaign(campaign("budget"), Path("c"), TYPED),
+            step.after_campaign(campaign("budget"), Path("c"), [*TYPED, "--max-rounds", "2"]),
             [
                 "excite campaign arm.yaml --measure 'p {motion} {data}' --resume --max-rounds 4",
             ],
