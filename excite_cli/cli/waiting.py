@@ -125,7 +125,14 @@ class OnTerminal(Waiting):
         self.console = console
         columns: list[ProgressColumn] = [SpinnerColumn()]
         columns += [TextColumn("{task.fields[text]}", table_column=Column(overflow="fold"))]
-        self._bar = Progress(*columns, _Remaining(), console=console, transient=True)
+        self._bar = Progress(
+            *columns,
+            _Remaining(),
+            console=console,
+            transient=True,
+            redirect_stdout=False,  # in place of these nothing knows whether it is a terminal
+            redirect_stderr=False,
+        )
         self._task = self._bar.add_task("", total=None, text="")
 
     def start(self) -> None:
