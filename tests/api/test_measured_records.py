@@ -58,7 +58,7 @@ def test_a_diagnosis_is_told_as_by_the_program() -> None:
     assert "viscous friction on " in repr(found)
     assert "mean error" in repr(found)
     answer = diagnosis_answer(found, "arm.yaml", {"diagnosis": "d.h5", "config": None})
-    for part in answer.parts[:-4]:  # but for what the program says of itself
+    for part in answer.parts[:-5]:  # but for what the program says of itself
         assert escape(part if isinstance(part, str) else part.title) in html_of(found)
     assert answer.parts[-1] == Command(("excite", "optimize", "arm.yaml", "--after", "d.h5"))
     assert answer.data["output"] == {"diagnosis": "d.h5"}
