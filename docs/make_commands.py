@@ -18,7 +18,9 @@ Made by `python -m docs.make_commands` from the program's own help; a test keeps
 terminal `excite COMMAND --help` says the same.
 
 Answers go to stdout (`--json`: for programs, see [Files and JSON](files.md)), progress and messages
-to stderr.
+to stderr. What is done, and how long it will take at most, stands in a line at the bottom of a
+terminal; in a log it is written after two seconds and then every ten (`--no-progress`: neither).
+At the end stands what to do next (`next` in JSON, command lines; `--quiet` leaves it out).
 
 | exit status | means |
 |---|---|

@@ -51,10 +51,10 @@ def diagnosis_of(number: int) -> str:
 
 
 def warnings_only(tell: Tell) -> Tell:
-    """What a step says is told where it matters beyond that step."""
+    """What a step says is told where it matters beyond that step, and what it does."""
 
     def told(note: Note) -> None:
-        if note.level is Level.WARNING:
+        if note.level in (Level.WARNING, Level.STEP):
             tell(note)
 
     return told
@@ -75,7 +75,7 @@ class RoundPlans:
         count = max(self.case.spec.sequence.motions or _FEWEST, _FEWEST)
         pace = pace_of(1, state.asked.from_speed)
         spec, path = at_pace(pace, self.case.spec), self.folder / _FIRST
-        self._say(f"round 1: {count} motions")
+        self._begin(1, f"planning {count} motions")
         problem = self._problem(from_rest(spec) if state.asked.entry else spec, 1, count)
         try:
             result = self._planned(problem, path)
@@ -120,7 +120,7 @@ class RoundPlans:
         alone = state.asked.plain or not unseen
         case = replace(self.case, spec=_of(spec, number, 2 if alone else 1))
         following = plan_after(case, found, tell=unheard)
-        self._say(f"round {number}: {following.messages[0]}")
+        self._begin(number, f"planning a motion. {following.messages[0]}")
         path = self.folder / f"{name}.h5"
         result = self._planned(following, path)
         efficiency = _efficiency(following.model, result)
@@ -130,7 +130,7 @@ class RoundPlans:
             path = self.folder / f"{name}_explore.h5"
             problem = self._problem(_showing(spec, (*known, *unseen)), number, 1)
             what = f"exploration motion for {len(unseen)} untested candidate effects"
-            self._say(f"round {number}: {what}")
+            self._begin(number, f"planning an {what}")
             logs = [self.folder / each.data for each in state.motions]
             result = self._planned(problem, path, logs)
             motions += self._motions(number, "explore", path, result, pace, len(motions))
@@ -209,6 +209,10 @@ class RoundPlans:
 
     def _say(self, text: str) -> None:
         self.tell(Note(Level.INFO, text))
+
+    def _begin(self, number: int, what: str) -> None:
+        self._say(f"round {number}: {what}")
+        self.tell(Note(Level.STEP, "", f"round {number}, planning"))
 
 
 def on_robot(records: Sequence[EffectRecord], robot: Robot) -> list[EffectRecord]:

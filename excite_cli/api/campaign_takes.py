@@ -49,6 +49,7 @@ class Takes:
         FileError
             It is not the motion that was proved.
         """
+        self._step(motion, "checking the motion as it is played")
         motion, path = self._exported(state, motion)
         log = self.folder / f"{motion.name}_log{self.measure.suffix}"
         used = [self.folder / each.data for each in state.motions]
@@ -56,7 +57,7 @@ class Takes:
         take = Take(motion.name, path, log, motion.seconds, log.with_suffix(".txt"), refused)
         self.measure.wait_for_earlier(take)
         speed = f"with {motion.pace:.0%} of the limits of speed, acceleration and jerk"
-        text = f"{motion.name}: {motion.seconds:.1f} s, {speed}"
+        text = f"{motion.name}: measuring a motion of {motion.seconds:.1f} s, {speed}"
         self.tell(Note(Level.INFO, text))
         if log.exists() and not is_measured(log):  # the campaign was killed, or its program failed
             why = (
@@ -66,7 +67,10 @@ class Takes:
             motion = self._rejected(motion, log, why)
         why = ""
         for _ in range(self.retries + 1):
-            why = self._taken(take) or self._no_log_of(path, used, self.tell, log)
+            self._step(motion, f"measuring (a motion of {motion.seconds:.0f} s)")
+            why = self._taken(take)
+            self._step(motion, "checking the log")
+            why = why or self._no_log_of(path, used, self.tell, log)
             if not why:
                 return replace(motion, data=log.name)
             motion = self._rejected(motion, log, why)
@@ -74,6 +78,9 @@ class Takes:
             f"{motion.name} was not measured in {self.retries + 1} tries: {why} Everything before "
             "it is kept: see to the cause, then go on with --resume."
         )
+
+    def _step(self, motion: PlayedMotion, what: str) -> None:
+        self.tell(Note(Level.STEP, "", f"{motion.name}, {what}"))
 
     def _exported(self, state: Campaign, motion: PlayedMotion) -> tuple[PlayedMotion, Path]:
         """The motion as it will be played, and its file, by an own check admissible."""

@@ -229,15 +229,19 @@ class _Loop:
     def _learned(self, state: Campaign, last: CampaignRound) -> RoundFindings:
         path = self.folder / diagnosis_of(last.number)
         logs = [self.folder / each.data for each in state.motions]
-        self._say(f"round {last.number}: diagnosis of {len(logs)} logs")
+        what = f"round {last.number}: diagnosing {len(logs)} logs"
+        self._say(what)
+        self.tell(Note(Level.STEP, "", what))
         found = diagnose(
             self.case,
             logs,
             output=path,
             overwrite=True,
             workers=self.workers,
+            progress=lambda text, done: self.tell(Note(Level.STEP, text)),
             tell=warnings_only(self.tell),
         )
+        self.tell(Note(Level.STEP, "", f"round {last.number}: what the next motion is for"))
         save_config(self.folder / MODEL, self.case, found, unconfirmed=True)
         following = plan_after(self.case, found, tell=unheard)
         separation = following.problem.separation

@@ -50,6 +50,7 @@ def diagnose(
     apply: str | Path | None = None,
     apply_unconfirmed: bool = False,
     overwrite: bool = False,
+    command: str = "",
     workers: Workers | None = None,
     progress: Callable[[str, int], None] = unheard,
     tell: Tell = log_note,
@@ -60,7 +61,8 @@ def diagnose(
     `data` are measured data or their files. Written to `output` (HDF5) if that is given, and the
     config with what was found to `apply` (YAML); where the error on held-out data did not fall
     (`good` is false), that is written with `apply_unconfirmed` only, and where the textbook's model
-    is better (`worse_than_textbook`), that one is. `workers` (`open_workers`) share the runs; every
+    is better (`worse_than_textbook`), that one is. `command`: the line that a report shows as what
+    made it. `workers` (`open_workers`) share the runs; every
     number is the same without. `ended` is asked between the steps of the search: once it is true,
     or after `diagnosis.max_seconds`, the answer so far is it.
 
@@ -87,8 +89,10 @@ def diagnose(
         found = diagnose_dataset(
             problem.robot, robot_base(problem), dataset, problem.spec, held_out, progress, ended
         )
+        made = {"command": command} if command else {}
         found = replace(
             found,
+            processing=found.processing | made,
             config=spec_as_yaml(problem.spec),
             config_folder=str(problem.folder),
             versions=versions(),

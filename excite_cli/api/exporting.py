@@ -144,6 +144,7 @@ def export_file(
         to = target or Path(f"{path.stem}{MODEL_FORMATS[format]}")
         wanted = ModelRequest(path, format, to, limits, samples, seed)
         refuse_inputs_as_outputs({"--output": to}, (path, *paths_in(limits)))
+        tell(Note(Level.STEP, "writing the model, and playing it on its held-out data"))
         with _held([to], is_package if format == "ros2-package" else None, overwrite):
             errors = write_requested(wanted, tell)
         return Exported(format, (to,), held_out=errors)

@@ -43,7 +43,7 @@ from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.dataset import Dataset, joined, merged
 from excite_cli.report.page import render
 from excite_cli.robot.model import build_robot
-from excite_cli.shown.note import Tell, log_note
+from excite_cli.shown.note import Level, Note, Tell, log_note
 from excite_cli.summary.log_inspection import LogInspection as LogInspection
 from excite_cli.summary.log_inspection import inspection_answer as inspection_answer
 from excite_cli.summary.log_inspection import inspection_page
@@ -101,6 +101,7 @@ def inspect(
         for turn in range(_ROUNDS if files else 0):
             seen = set(map(_key, found))
             try:
+                tell(Note(Level.STEP, "reading and checking the data"))
                 recorded = as_recorded(case, files)
                 told, is_all = _looked(case, recorded, settings, tell)
             except ExciteError as error:  # of data as they are; or with what was tried
@@ -183,6 +184,7 @@ def _looked(
     spec = settled_case.spec
     processing = choose_processing(data.runs, spec.measurement.filter, spec.diagnosis.moving_speed)
     prepared = prepare_all(data.runs, processing)
+    tell(Note(Level.STEP, "fitting the textbook's model, set up as it is and otherwise"))
     return [*found, *look(case.robot, data.runs, prepared, spec)], True
 
 

@@ -200,6 +200,8 @@ def problem_of(case: Problem | Case, tell: Tell = log_note) -> Problem:
 
 def _built(spec: Spec, folder: Path, file: Path | None, tell: Tell) -> Problem:
     work = states_of_work(spec, folder, tell)
+    words = "base parameters, limits and collision geometry (up to two minutes for a new robot)"
+    tell(Note(Level.STEP, f"preparing {words}"))
     problem = replace(build_problem(spec, folder, fit_knowledge(spec, folder), work), file=file)
     for note in problem_notes(problem):
         tell(note)
@@ -282,6 +284,7 @@ def load_data(
         return dataset_of(problem, files, tell)
     problem = measured_case(problem)
     robot = problem.robot
+    tell(Note(Level.STEP, "reading and checking the data"))
     data = as_recorded(problem, files)
     raise_for_errors(data)
     data = completed(problem, data)

@@ -172,8 +172,8 @@ def save_proposal(
         # A wrong name is reported at once, and what may be read is asked first.
         _, needed = load_with_folders(source, dirs, folder, xacro_args, allow)
         allowed = {each.folder for each in needed}
-        text = f"looking at {name}: preparing collision geometry (cached)"
-        tell(Note(Level.INFO, text))
+        words = "fitting collision geometry (once; up to two minutes), choosing posture and pace"
+        tell(Note(Level.STEP, words))
         found = propose(
             source,
             folder,

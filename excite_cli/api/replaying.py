@@ -87,6 +87,7 @@ def replay(
             f"--beside: only where set points are played, and the torque of {stored.path} was "
             "measured. Replay the other model by itself."
         )
+    tell(Note(Level.STEP, "playing the recorded torques in MuJoCo"))
     exported = simulated_model(stored)
     notes = exported.notes
     q = np.concatenate([run.q for run in runs])

@@ -80,6 +80,7 @@ def score(
             place = workers or Here()
             return place.map(score_file, shared, [*map(str, files)], watch, keep_failures=True)
 
+        tell(Note(Level.STEP, "playing the model on the data"))
         runs, findings = _gathered(scored(None, paths), [*map(str, paths)], tell)
         if not runs:
             raise FileError("no run is long enough to be scored: record longer ones.")

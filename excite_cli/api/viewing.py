@@ -4,6 +4,7 @@ import webbrowser
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from excite_cli.api.arguments import checked, existing, paths_in
 from excite_cli.api.loading import load_problem, rebuilt_problem
@@ -11,6 +12,7 @@ from excite_cli.api.motions import Motions, load_motions, motions_of, tell_doubt
 from excite_cli.api.outputs import held
 from excite_cli.atomic import write_atomically
 from excite_cli.errors import ConfigError, FileError
+from excite_cli.excitation.inspection import not_modelled
 from excite_cli.excitation.problem import Problem
 from excite_cli.excitation.result import Result
 from excite_cli.shown.answer import Answer
@@ -18,6 +20,7 @@ from excite_cli.shown.note import Level, Note, Tell, log_note, saying, unheard
 from excite_cli.store.diagnosis_file import is_diagnosis
 from excite_cli.store.fit_file import is_fit
 from excite_cli.store.result_file import is_result, read_result
+from excite_cli.summary.pairs import not_modelled_in_words
 from excite_cli.trajectory.fade import Segment
 from excite_cli.view.browser import Serving as Serving
 from excite_cli.view.browser import play_in_browser
@@ -32,13 +35,17 @@ _SMALLEST, _LARGEST = 16, 4096  # pixels
 
 @dataclass(frozen=True)
 class Drawing:
-    """A picture that was written: `size` in bytes; of a GIF its frames and its length [s]."""
+    """A picture that was written: `size` in bytes; of a GIF its frames and its length [s].
+
+    `not_modelled`: what is not in the picture, although it may be around the robot.
+    """
 
     path: Path
     motion: str
     size: int
     frames: int | None = None
     seconds: float | None = None
+    not_modelled: tuple[str, ...] = ()
 
 
 @checked("motions")
@@ -144,6 +151,7 @@ def draw_motion(
         len(content),
         None if film is None else film.frames,
         None if film is None else film.seconds,
+        not_modelled(problem),
     )
 
 
@@ -188,10 +196,12 @@ class _Film:
 
 def drawing_answer(found: Drawing) -> Answer:
     """What `excite view --png` and `--gif` answer: the file."""
-    data = {"picture": str(found.path), "motion": found.motion, "bytes": found.size}
+    data: dict[str, Any] = {"picture": str(found.path), "motion": found.motion}
+    data |= {"bytes": found.size, "not_modelled": list(found.not_modelled)}
     if found.frames is not None:
         data |= {"frames": found.frames, "seconds": found.seconds}
-    return Answer((str(found.path),), data)
+    said = [not_modelled_in_words(found.not_modelled)] if found.not_modelled else []
+    return Answer((str(found.path), *said), data)
 
 
 def _check_size(size: tuple[int, int]) -> None:

@@ -6,7 +6,7 @@ from math import isfinite
 from excite_cli.campaign.records import Campaign, pace_of
 from excite_cli.diagnosis.records import Diagnosis
 from excite_cli.diagnosis.verdict import HeldOutVerdict
-from excite_cli.diagnosis.words import place_in_words
+from excite_cli.diagnosis.words import place_in_words, title_of
 
 # How much more of a joint's torque, or in N·m, may be left on the newest motion than on those that
 # the model was fitted to.
@@ -41,8 +41,8 @@ def still_open(found: Diagnosis, pairs: tuple[str, ...]) -> tuple[str, ...]:
     said += [f"{joint}: excess residual of the torque" for joint in found.joints_with_residual]
     said += left_on_newest(found)
     said += [
-        f"{each.effect.kind} on {place_in_words(each.effect, len(found.joint_names))}: the newest "
-        "motion is predicted worse with it"
+        f"{title_of(each.effect.kind)} on {place_in_words(each.effect, len(found.joint_names))}: "
+        "the newest motion is predicted worse with it"
         for each in found.effects
         if each.verdict is HeldOutVerdict.HARMFUL
         and min((r.relative_moving for r in each.removes.values()), default=0.0) < -_SMALL

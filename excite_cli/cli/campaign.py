@@ -1,5 +1,6 @@
 """`excite campaign`: plan, have it measured, diagnose, plan the next."""
 
+import sys
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ import typer
 from excite_cli.api.showing import Tell, saying
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.next_step import after_campaign
 from excite_cli.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -143,10 +145,11 @@ def campaign(
             retries=retries,
             resume=resume,
             workers=place,
-            progress=start_line(line, case.spec),
+            progress=start_line(line, case.spec, counted=False),
             tell=terminal.tell,
         )
-    terminal.show(campaign_answer(found, output, {"model": MODEL, "page": PAGE}))
+    answer = campaign_answer(found, output, {"model": MODEL, "page": PAGE})
+    terminal.show(answer, after_campaign(found, output, sys.argv[1:]))
 
 
 def _measured_by(

@@ -4,6 +4,7 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.next_step import after_check
 
 
 @options.command
@@ -41,6 +42,7 @@ def check(
     from excite_cli.api.checking import check as check_motions
     from excite_cli.api.checking import check_answer
     from excite_cli.api.loading import load_problem
+    from excite_cli.api.motions import is_result
 
     existing(file)
     problem = load_problem(config, overrides or (), terminal.tell)
@@ -55,4 +57,5 @@ def check(
             progress=lambda done, total: line(f"motion {done + 1}/{total}", done, total),
             tell=terminal.tell,
         )
-    terminal.show(check_answer(found, str(file), problem))
+    answer = check_answer(found, str(file), problem)
+    terminal.show(answer, after_check(answer.good, config, file, is_result(file)))

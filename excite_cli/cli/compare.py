@@ -6,6 +6,7 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.next_step import next_step
 from excite_cli.errors import ConfigError
 
 
@@ -48,7 +49,9 @@ def compare(
     found = compare_files(
         files, dict(map(_column, covariate or ())), output=output, overwrite=overwrite
     )
-    terminal.show(changes_answer(found, output))
+    words = "find out what changed in the robot" if found.significant else ""
+    following = next_step(words, "diagnose", "CONFIG.yaml", "NEWEST.h5") if words else ()
+    terminal.show(changes_answer(found, output), following)
 
 
 def _column(text: str) -> tuple[str, list[float]]:

@@ -6,6 +6,7 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.next_step import next_step
 
 
 @options.command
@@ -77,4 +78,9 @@ def compare_random(
                 drawn=lambda n, best: line(f"{n} of {candidates} drawn, best {best:.1f}", n),
                 workers=place,
             )
-    terminal.show(comparison_answer(found, str(output) if output is not None else None))
+    following = (
+        next_step("keep motions of this config", "optimize", config)
+        if optimized is None
+        else next_step("write the motions for the controller", "export", optimized, "-f", "csv")
+    )
+    terminal.show(comparison_answer(found, None if output is None else str(output)), following)

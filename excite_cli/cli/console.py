@@ -11,25 +11,16 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol, TextIO
+from typing import Any, TextIO
 
 import typer
 from rich.console import Console, ConsoleOptions, RenderableType
-from rich.progress import (
-    Progress,
-    ProgressColumn,
-    SpinnerColumn,
-    Task,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 from rich.segment import Segment
-from rich.table import Column
 from rich.text import Text
 
 from excite_cli.api.showing import Answer, Command, Level, Note, Part, Table
 from excite_cli.cli.layout import copyable, rendered, wrapped
+from excite_cli.cli.waiting import InLog, Line, OnTerminal, Waiting
 from excite_cli.errors import ExciteWarning
 
 # Off a terminal rows stay whole, so that they can be searched and cut.
@@ -69,17 +60,25 @@ class Terminal:
 
     def tell(self, note: Note) -> None:
         """Progress messages of the library."""
-        if note.level is Level.DETAIL:
+        if note.level is Level.STEP:
+            _shown[-1].begin(note.text, note.where)
+        elif note.level is Level.DETAIL:
             self.detail(note.sentence)
         else:
             self.say(note.sentence)
 
-    def show(self, answer: Answer) -> None:
-        """The answer, as JSON or as tables and sentences; exit status 1 where it is bad."""
+    def show(self, answer: Answer, following: Sequence[Part] = ()) -> None:
+        """The answer, as JSON or as tables and sentences; exit status 1 where it is bad.
+
+        `following`: what to do next, which is no answer, and not said where only that is wanted.
+        """
+        _shown[-1].stop()
         if self.as_json:
-            print(json.dumps(_finite(answer.data), ensure_ascii=not is_unicode(sys.stdout)))
+            lines = [part.line for part in following if isinstance(part, Command)]
+            data = answer.data | ({"next": lines} if lines else {})
+            print(json.dumps(_finite(data), ensure_ascii=not is_unicode(sys.stdout)))
         else:
-            self._print(answer.parts)
+            self._print((*answer.parts, *(() if self.quiet else following)))
         if not answer.good:
             raise typer.Exit(1)
 
@@ -92,62 +91,43 @@ class Terminal:
         print("\n".join(line.rstrip() for line in printed.get().splitlines()))
 
     @contextmanager
-    def live(self, title: str, total: int | None = None) -> Iterator["Line"]:
-        """A progress line; call what is yielded with a text, the count done, and that of all.
+    def waiting(self, name: str) -> Iterator[None]:
+        """Within it those who wait see what the command `name` does, until its answer."""
+        shown = not self.quiet and self.progress
+        on_terminal = _is_terminal(sys.stderr)
+        made = OnTerminal(_console(sys.stderr)) if on_terminal else InLog(harmless)
+        _shown.append(made if shown else Waiting())
+        try:
+            with _shown[-1].step(name, None):
+                _shown[-1].start()
+                yield
+        finally:
+            _shown.pop().stop()
 
-        On a terminal only; elsewhere a line every few seconds with `--verbose`, else nothing.
-        """
-        if self.quiet or not self.progress:
-            yield _silent
-            return
-        if not _is_terminal(sys.stderr):
-            yield _sparse(title) if self.verbose else _silent
-            return
-        columns: list[ProgressColumn] = [SpinnerColumn()]
-        columns += [TextColumn("{task.description}")] if title else []
-        columns += [TextColumn("{task.fields[text]}", table_column=Column(overflow="fold"))]
-        columns += [_Remaining()]
-        out = self.err
-        with Progress(*columns, console=out, transient=True) as bar, _beside(out):
-            task = bar.add_task(title, total=total, text="")
-            started = 0
-
-            def show(text: str, done: int, total: int | None = None) -> None:
-                nonlocal started
-                if done < started:  # the next motion counts from zero again
-                    bar.reset(task)
-                started = done
-                bar.update(task, completed=done, total=total, text=text)
-
-            yield show
+    @contextmanager
+    def live(self, title: str, total: int | None = None) -> Iterator[Line]:
+        """A step: call what is yielded with a text, the count done, and that of all."""
+        with _shown[-1].step(title, total) as line:
+            yield line
 
 
-# Consoles whose progress line is shown: only they know how to print a message above it.
-_live: list[Console] = []
+# What those who wait see: of the command that runs, or nothing.
+_shown: list[Waiting] = [Waiting()]
 
 
 @contextmanager
-def _beside(out: Console) -> Iterator[None]:
-    _live.append(out)
+def asking() -> Iterator[None]:
+    """Within it a person is asked: nothing else is shown."""
+    _shown[-1].stop()
     try:
         yield
     finally:
-        _live.remove(out)
+        _shown[-1].start()
 
 
 def _messages() -> Console:
-    return _live[-1] if _live else _console(sys.stderr)
-
-
-class Line(Protocol):
-    """A progress line: a text, how much is done, and how much there is, once that is known."""
-
-    def __call__(self, text: str, done: int, total: int | None = None) -> None:
-        """Show it."""
-
-
-def _silent(text: str, done: int, total: int | None = None) -> None:
-    """No line."""
+    _shown[-1].spoken()
+    return _shown[-1].console or _console(sys.stderr)
 
 
 class _Console(Console):
@@ -164,16 +144,6 @@ class _Console(Console):
 def harmless(text: str) -> str:
     """A text that a terminal only shows."""
     return text.translate(_OBEYED)
-
-
-class _Remaining(TimeRemainingColumn):
-    """The time that all steps need; the time that has passed until that is known."""
-
-    def render(self, task: Task) -> Text:
-        """`≤ 0:00:12`, or `0:00:03`."""
-        if task.time_remaining is None:
-            return TimeElapsedColumn().render(task)
-        return Text.assemble("≤ ", super().render(task))
 
 
 def _print(out: Console, part: Part) -> None:
@@ -224,21 +194,6 @@ def _console(file: TextIO) -> Console:
         width=width,
         color_system=None if plain else "auto",
     )
-
-
-def _sparse(title: str) -> Line:
-    """Progress for logs: a line every few seconds."""
-    import time
-
-    last = time.monotonic()
-
-    def tell(text: str, done: int, total: int | None = None) -> None:
-        nonlocal last
-        if time.monotonic() - last >= 5.0:
-            last = time.monotonic()
-            print(harmless(f"{title}  {text}".strip()), file=sys.stderr, flush=True)
-
-    return tell
 
 
 def _finite(value: Any) -> Any:

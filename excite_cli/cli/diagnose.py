@@ -1,9 +1,11 @@
 """`excite diagnose`: what the declared model lacks, and the error before and after."""
 
+import sys
 from pathlib import Path
 
 import typer
 
+from excite_cli.api.showing import Command
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
@@ -67,10 +69,11 @@ def diagnose(
             apply=apply,
             apply_unconfirmed=apply_unconfirmed,
             overwrite=overwrite,
+            command=Command(("excite", *sys.argv[1:])).line,
             workers=place,
             progress=line,
             tell=terminal.tell,
             ended=ended,
         )
     written = {"diagnosis": output, "config": apply if found.good or apply_unconfirmed else None}
-    terminal.show(diagnosis_answer(found, str(config), written, terminal.verbose))
+    terminal.show(diagnosis_answer(found, str(config), written, terminal.verbose, data))

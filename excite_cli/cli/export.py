@@ -7,6 +7,7 @@ import typer
 from excite_cli.cli import options
 from excite_cli.cli.completion import complete_format
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.next_step import after_export
 from excite_cli.cli.options import start_from
 from excite_cli.errors import ConfigError
 
@@ -126,7 +127,7 @@ def export(
         overwrite=overwrite,
         tell=terminal.tell,
     )
-    terminal.show(export_answer(found))
+    terminal.show(export_answer(found), after_export(found, file))
 
 
 def _numbers(motion: str) -> list[int]:

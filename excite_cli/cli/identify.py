@@ -7,6 +7,7 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.next_step import after_identify, next_step
 
 
 class Load(StrEnum):
@@ -80,7 +81,11 @@ def identify(
             load = identify_load(
                 case, data, fit, link, **formats, overwrite=overwrite, tell=terminal.tell
             )
-        terminal.show(load_answer(load, formats))
+        rest = ("--only", "payload", "--fit", fit, "--ur", "payload.script")
+        words = "write it for a controller of UR (of Franka: --franka)"
+        kept = any(formats.values()) or not load.possible
+        following = () if kept else next_step(words, "identify", config, *data, *rest)
+        terminal.show(load_answer(load, formats), following)
         return
     given = {"--fit": fit, "--link": link, "--ur": ur, "--franka": franka}
     if any(each is not None for each in given.values()):
@@ -102,4 +107,6 @@ def identify(
             progress=line,
             tell=terminal.tell,
         )
-    terminal.show(identification_answer(found, {"fit": output, **models}))
+    lacking = any(each.kind == "much_left" for each in found.findings)
+    following = after_identify(lacking, config, data, output)
+    terminal.show(identification_answer(found, {"fit": output, **models}), following)

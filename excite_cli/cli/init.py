@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from excite_cli.api.showing import Command, as_word
 from excite_cli.cli import options
-from excite_cli.cli.console import Terminal
+from excite_cli.cli.console import Terminal, asking
+from excite_cli.cli.next_step import next_step
 from excite_cli.errors import ConfigError, RobotError, nearest
 
 if TYPE_CHECKING:
@@ -114,7 +116,8 @@ def init(
         answers = _Answers(str(urdf), output, chosen)
     elif interactive:
         own = package_dirs or ()
-        answers = _ask(output, chosen, lambda each: limbs_of(each, own, arguments, allow))
+        with asking():
+            answers = _ask(output, chosen, lambda each: limbs_of(each, own, arguments, allow))
     else:
         raise ConfigError(
             "init needs a robot: --robot NAME (`excite robots` lists them) or --urdf FILE. At "
@@ -137,7 +140,11 @@ def init(
         overwrite=overwrite,
         tell=terminal.tell,
     )
-    terminal.show(answer)
+    written = Path(answer.data["output"])
+    following = next_step("plan motions, or check a recording that you have", "optimize", written)
+    terminal.show(
+        answer, (*following, Command(("excite", "inspect", as_word(written), "DATA.csv")))
+    )
 
 
 def _pairs(words: Sequence[str]) -> dict[str, str]:
@@ -173,7 +180,8 @@ def _may_read(allow_found: bool, at_terminal: bool) -> "Allow":
             return allow_found and needed.near
         if str(needed) not in answers:
             question = f"Read {needed.folder}? The robot asks for {needed}, outside its own folder."
-            answers[str(needed)] = typer.confirm(question, default=False, err=True)
+            with asking():
+                answers[str(needed)] = typer.confirm(question, default=False, err=True)
         return answers[str(needed)]
 
     return allow

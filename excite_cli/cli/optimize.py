@@ -7,6 +7,7 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.next_step import after_optimize
 from excite_cli.errors import ConfigError
 
 # κ of a UR10's motion is 8 after so many; a diagnosis of it is the same as after 1000.
@@ -145,7 +146,8 @@ def optimize(
                 workers=place,
                 tell=terminal.tell,
             )
-    terminal.show(plan_answer(planned, result, str(path), efficiency, sizes))
+    answer = plan_answer(planned, result, str(path), efficiency, sizes)
+    terminal.show(answer, after_optimize(answer.good, config, path, after, fit))
 
 
 def _refuse_beside_payload(fit: Path | None, other: object, motions: int | None) -> None:

@@ -203,9 +203,10 @@ def command(run: Callable[..., None]) -> Callable[..., None]:
 
     @functools.wraps(run)
     def limited(terminal: Terminal, **given: Any) -> None:
-        from excite_cli.api.working import single_threaded
+        with terminal.waiting(run.__name__.replace("_", "-")):
+            from excite_cli.api.working import single_threaded
 
-        with single_threaded(given.get("threads", 1)):
-            run(terminal, **given)
+            with single_threaded(given.get("threads", 1)):
+                run(terminal, **given)
 
     return with_messages(limited)

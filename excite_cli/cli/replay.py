@@ -6,6 +6,7 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.next_step import next_step
 
 
 @options.command
@@ -41,4 +42,10 @@ def replay(
     from excite_cli.api.replaying import replay_answer
 
     found = replay_data(model, data, held_out=held_out, beside=beside, tell=terminal.tell)
-    terminal.show(replay_answer(found))
+    answer = replay_answer(found)
+    following = (
+        next_step("take the model to a simulator", "export", model, "-f", "mjcf")
+        if answer.good
+        else next_step("find what the model lacks", "diagnose", "CONFIG.yaml", *data)
+    )
+    terminal.show(answer, following)

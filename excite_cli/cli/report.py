@@ -7,6 +7,7 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.next_step import next_step
 
 
 class Format(StrEnum):
@@ -69,4 +70,5 @@ def report(
             overwrite=overwrite,
             progress=line,
         )
-    terminal.show(report_answer(found))
+    following = next_step(f"open {found.page} in a browser") if found.page else ()
+    terminal.show(report_answer(found), following)

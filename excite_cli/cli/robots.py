@@ -5,6 +5,7 @@ import typer
 from excite_cli.cli import options
 from excite_cli.cli.completion import complete_robot
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.next_step import next_step
 
 
 @options.with_messages
@@ -29,4 +30,7 @@ def robots(
     """
     from excite_cli.api.proposing import describe_robot, list_robots, robot_answer
 
-    terminal.show(list_robots() if robot is None else robot_answer(describe_robot(robot)))
+    following = next_step("write a config for one", "init", "--robot", robot or "NAME")
+    terminal.show(
+        list_robots() if robot is None else robot_answer(describe_robot(robot)), following
+    )

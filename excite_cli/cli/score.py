@@ -6,6 +6,7 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.next_step import after_forecast, after_score
 from excite_cli.errors import ConfigError
 
 
@@ -81,7 +82,7 @@ def score(
         )
         if limits is not None:
             thresholds(model, data, false_alarms=false_alarms, output=limits, overwrite=overwrite)
-    terminal.show(score_answer(found))
+    terminal.show(score_answer(found), after_score(found, data, output))
 
 
 def _forecast(
@@ -91,4 +92,5 @@ def _forecast(
 
     if data or any(files):
         raise ConfigError("--job: it takes no measured data, and writes no file. Run both in turn.")
-    terminal.show(forecast_answer(forecast(model, job, tell=terminal.tell)))
+    found = forecast(model, job, tell=terminal.tell)
+    terminal.show(forecast_answer(found), after_forecast(found.good, model, job))

@@ -8,6 +8,7 @@ import typer
 from excite_cli.cli import options
 from excite_cli.cli.completion import complete_effect
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.next_step import next_step
 from excite_cli.cli.stopping import answer_so_far
 
 _ASKED = "The case that runs is finished first; Ctrl-C again to stop at once."
@@ -106,4 +107,10 @@ def selftest(
             ended=ended,
         )
     folder = "" if output is None else str(output / PAGE)
-    terminal.show(selftest_answer(found, terminal.verbose, folder))
+    answer = selftest_answer(found, terminal.verbose, folder)
+    following = (
+        next_step("play motions like these on the robot", "export", motions, "-f", "csv")
+        if answer.good
+        else next_step("plan more motions, and test again", "optimize", config, "--motions", "6")
+    )
+    terminal.show(answer, following)

@@ -14,6 +14,7 @@ from excite_cli.cli import options
 from excite_cli.cli.completion import complete_effect
 from excite_cli.cli.console import Terminal
 from excite_cli.cli.help_page import OUTPUT
+from excite_cli.cli.next_step import next_step
 from excite_cli.cli.options import start_from
 from excite_cli.errors import ConfigError
 
@@ -222,7 +223,9 @@ def simulate(
             progress=line,
             tell=terminal.tell,
         )
-    terminal.show(simulation_answer(found, str(output), settings.seed))
+    rest = (config, output, "-o", "diagnosis.h5", "--apply", "better.yaml")
+    following = next_step("find what the model lacks", "diagnose", *rest)
+    terminal.show(simulation_answer(found, str(output), settings.seed), following)
 
 
 def _drive(

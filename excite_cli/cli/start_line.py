@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from excite_cli.api.planning import most_motions
 from excite_cli.api.showing import ProgressMeasure, figure_in_words
-from excite_cli.cli.console import Line
+from excite_cli.cli.waiting import Line
 from excite_cli.config.spec import Spec
 
 if TYPE_CHECKING:
@@ -37,14 +37,18 @@ def iterations_of(problem: "Planned") -> int:
     return problem.spec.optimizer.max_iterations * problem.restarts
 
 
-def start_line(show: Line, spec: Spec) -> Callable[[int, "Progress"], None]:
-    """What `plan` reports to, shown with `show(text, iterations done)`."""
-    total, most = most_motions(spec.sequence), spec.optimizer.max_iterations
-    of = "of" if spec.sequence.until is None else "of at most"
+def start_line(show: Line, spec: Spec, counted: bool = True) -> Callable[[int, "Progress"], None]:
+    """What `plan` reports to, shown with `show(text, iterations done)`.
+
+    counted: how many motions there will be is what the config says.
+    """
+    most = spec.optimizer.max_iterations
+    of = " of" if spec.sequence.until is None else " of at most"
+    of = f"{of} {most_motions(spec.sequence)}" if counted else ""
     best: dict[int, Best] = defaultdict(Best)
 
     def tell(index: int, progress: "Progress") -> None:
-        words = f"motion {index} {of} {total}: {best[index].words(progress)}, "
+        words = f"motion {index}{of}: {best[index].words(progress)}, "
         starts = progress.starts
         if starts is None:
             show(f"{words}iteration {progress.iteration} of {most}", progress.iteration)

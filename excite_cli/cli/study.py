@@ -6,6 +6,7 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.next_step import next_step
 
 
 @options.command
@@ -82,4 +83,7 @@ def study(
             progress=progress,
             workers=place,
         )
-    terminal.show(study_answer(records, study_folder(config, output)))
+    folder = study_folder(config, output)
+    answer = study_answer(records, folder)
+    words = "open the table" if answer.good else "see to the messages, and repeat with --resume;"
+    terminal.show(answer, next_step(f"{words} {answer.data['table']}"))

@@ -2,6 +2,7 @@
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.next_step import next_step
 
 
 @options.command
@@ -29,4 +30,5 @@ def verify_gradient(
     problem = load_problem(config, options.changes(changes, seed=seed), terminal.tell)
     with terminal.live("differences of every variable"):
         found = verify(problem)
-    terminal.show(gradient_answer(found))
+    answer = gradient_answer(found)
+    terminal.show(answer, next_step("plan motions", "optimize", config) if answer.good else ())

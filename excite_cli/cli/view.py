@@ -8,6 +8,7 @@ import typer
 
 from excite_cli.cli import options
 from excite_cli.cli.console import Terminal
+from excite_cli.cli.next_step import next_step
 from excite_cli.errors import ConfigError, FileError
 
 
@@ -127,7 +128,8 @@ def view(
             workers=place,
             tell=terminal.tell,
         )
-    terminal.show(drawing_answer(found))
+    following = () if config else next_step("see margins and figures of it", "report", file)
+    terminal.show(drawing_answer(found), following)
 
 
 def _target(png: Path | None, gif: Path | None) -> Path | None:

@@ -50,12 +50,29 @@ class _Layout:
     first_row: int  # number of lines before the first row
 
 
+_OTHERS = {  # what files are that begin so
+    b"\x89HDF": ("an HDF5 file", ".h5"),
+    b"PAR1": ("a parquet file", ".parquet"),
+    b"MATLAB ": ("a file of MATLAB", ".mat"),
+}
+
+
 def header_of(path: Path) -> tuple[str, ...]:
     """Names of the columns; nothing where the file is no table (reading it says why)."""
     try:
         return tuple(_layout(path).header)
     except (FileError, ValueError, csv.Error, OSError, EOFError, zlib.error):
         return ()
+
+
+def _refuse_other_kind(path: Path) -> None:
+    """Raise FileError where the first bytes say what a file is instead of a table."""
+    with path.open("rb") as file:
+        begins = file.read(8)
+    for mark, (kind, suffix) in _OTHERS.items():
+        if begins.startswith(mark):
+            name = f"{path.stem}{suffix} (in a campaign: --log {suffix})"
+            raise FileError(f"{path} is not a text table: it is {kind}. Name it {name}.")
 
 
 def read_table(path: Path) -> NamedColumns:
@@ -68,6 +85,7 @@ def read_table(path: Path) -> NamedColumns:
     """
     check_size(path)
     try:
+        _refuse_other_kind(path)
         _check_unpacked(path)
         layout = _layout(path)
         findings: list[Finding] = []

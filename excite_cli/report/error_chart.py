@@ -50,7 +50,7 @@ def _shown(value: float) -> bool:
 def _pair(name: str, first: float, second: float, words: tuple[str, str], floor: float) -> Row:
     marks = [Mark(first, words[0], "muted", "ring"), Mark(second, words[1], "blue")]
     if _shown(floor):
-        marks.append(Mark(floor, "noise floor", "green", "tick"))
+        marks.append(Mark(floor, "repeatability", "green", "tick"))
     return Row(name, tuple(marks), (Bar(min(first, second), max(first, second), "muted"),))
 
 

@@ -79,6 +79,17 @@ def noise_by_joint(found: Diagnosis) -> dict[str, float]:
     return known | {each.joint: each.noise or 0.0 for each in found.excess_residuals}
 
 
+def noise_in_words(found: Diagnosis) -> str:
+    """What `noise_by_joint` is."""
+    known = "what changes between repetitions of a motion"
+    if not found.noise_floor:
+        known = "its frequencies above those of the motion"
+    return (
+        f"±{_SIGMAS:g} times the noise of the measured torque (from {known}; on joints without an "
+        "unexplained residual, the RMS of the residual)"
+    )
+
+
 def plots_in_time(
     traces: Sequence[TorqueTrace],
     joint_names: Sequence[str],

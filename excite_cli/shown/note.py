@@ -15,6 +15,7 @@ from typing import Any, TypeVar, cast
 class Level(Enum):
     """How much a note matters; the value is the level of Python's logging."""
 
+    STEP = logging.DEBUG - 1  # what begins now: seen by those who wait, while it lasts
     DETAIL = logging.DEBUG
     INFO = logging.INFO
     HINT = logging.INFO + 1
@@ -28,7 +29,10 @@ _TOLD = {Level.HINT: "hint", Level.NOTE: "note", Level.WARNING: "warning"}
 
 @dataclass(frozen=True)
 class Note:
-    """One sentence; `where` names what it is about, such as the runs of a recording."""
+    """One sentence; `where` names what it is about, such as the runs of a recording.
+
+    Of a step it is the title under which that step and what is done in it are shown.
+    """
 
     level: Level
     text: str

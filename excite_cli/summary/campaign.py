@@ -66,9 +66,10 @@ def campaign_answer(campaign: Campaign, folder: Path, written: dict[str, str]) -
     """What `excite campaign` answers; `written`: what is in the folder, by what it is."""
     count = len(campaign.motions)
     total = (
-        f"{len(campaign.rounds)} rounds, {count} motions, {campaign.seconds:.0f} s of motion. "
-        "(torque std: standard deviation of the predicted torque at random states, in σ of the "
-        "torque noise; efficiency: information relative to D-optimal free states)"
+        f"{counted(len(campaign.rounds), 'round')}, {counted(count, 'motion')}, "
+        f"{campaign.seconds:.0f} s of motion. (torque std: standard deviation of the "
+        "predicted torque at random states, in σ of the torque noise; efficiency: information "
+        "relative to D-optimal free states)"
     )
     files = tuple(f"{what}: {folder / name}" for what, name in written.items())
     data = {

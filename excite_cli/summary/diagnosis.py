@@ -18,6 +18,7 @@ from excite_cli.diagnosis.words import (
     p_in_words,
     place_in_words,
     rests_in_words,
+    title_of,
     value_in_words,
 )
 from excite_cli.fields import data_of, public_data
@@ -25,6 +26,7 @@ from excite_cli.report.residual_chart import (
     IN_TIME,
     dependence_plots,
     noise_by_joint,
+    noise_in_words,
     residuals_in_time,
 )
 from excite_cli.report.validity_chart import validity_section
@@ -55,7 +57,7 @@ from excite_cli.summary.named_effects import (
     other_names,
     what_and_where,
 )
-from excite_cli.summary.status import purpose
+from excite_cli.summary.status import purpose, set_up_is_open
 
 _WORTH = 0.01  # share of the residual from which on a quantity is told
 _MOST_QUANTITIES = 18
@@ -67,8 +69,9 @@ def diagnosis_answer(
     config: str,
     written: Mapping[str, str | Path | None],
     verbose: bool = False,
+    data: Sequence[str | Path] = (),
 ) -> Answer:
-    """What `excite diagnose` answers; `written` are the files that were requested, by kind.
+    """What `excite diagnose` answers of the files `data`; `written` were requested, by kind.
 
     With `verbose` also how the data were processed, every round's suspects, and small effects.
     """
@@ -79,7 +82,7 @@ def diagnosis_answer(
     if not verbose:
         rounds = counted(len(found.rounds), "round")
         parts.append(f"({rounds} of tests; --verbose shows the rejected candidates, with reasons.)")
-    parts += [*files_in_words(files), *_next(found, experiment, config, files.get("diagnosis"))]
+    parts += [*files_in_words(files), *_next(found, config, data, files.get("diagnosis"))]
     return Answer(tuple(parts), {**diagnosis_data(found, experiment), "output": files}, found.good)
 
 
@@ -97,7 +100,7 @@ def diagnosis_sections(
 ) -> list[Section]:
     """Those that have something to say, in the order of a page, which shows the `robot`."""
     every = [
-        errors_section(found, detail, robot) if make is errors_section else make(found, detail)
+        make(found, detail, robot) if robot and make in WITH_ROBOT else make(found, detail)
         for make in SECTIONS
     ]
     return [section for section in every if section.blocks]
@@ -114,8 +117,8 @@ def _time_section(found: Diagnosis, detail: Detail) -> Section:
         noise = noise_by_joint(found)
         blocks = residuals_in_time(traces, found.joint_names, found.torque_units, noise)
     lead = (
-        f"{IN_TIME} of the model with all effects and of the declared one, over the noise. Shaded: "
-        "held out."
+        f"{IN_TIME} of the model with all effects and of the declared one, over a band of "
+        f"{noise_in_words(found)}. Shaded: held out."
     )
     return Section("diagnosis-time", "Residual in time", blocks, lead)
 
@@ -205,7 +208,7 @@ def _round_table(found: Diagnosis, each: Round) -> Table:
     unit = dict(zip(found.joint_names, found.torque_units, strict=True)).get(worst, "")
     rows = (
         {
-            "candidate": suspect.effect.kind,
+            "candidate": title_of(suspect.effect.kind),
             "where": place_in_words(suspect.effect, len(found.joint_names)),
             "p": p_in_words(suspect.p_value, suspect.least_p),
             "of residual": f"{suspect.share_of_residual:.1%}",
@@ -226,11 +229,11 @@ def _round_table(found: Diagnosis, each: Round) -> Table:
 def _next_section(found: Diagnosis, detail: Detail) -> Section:
     """On a page; an answer has the names of files to say it with."""
     experiment = next_experiment(found)
-    lead = f"Next: plan a motion, to {purpose(experiment['purpose'], len(experiment['pairs']))}."
+    lead = f"Next: plan a motion, to {purpose(found)}."
     if detail < Detail.PAGE:
         return Section("diagnosis-next", "Next motion", (), lead)
     rows = tuple(
-        tuple(f"{each['kind']} on {', '.join(each['joints'])}" for each in pair.values())
+        tuple(f"{title_of(each['kind'])} on {', '.join(each['joints'])}" for each in pair.values())
         for pair in experiment["pairs"]
     )
     names = ("found", "indistinguishable from")
@@ -247,10 +250,14 @@ def _data_section(found: Diagnosis, detail: Detail) -> Section:
         blocks += data_blocks(found, found.joint_names, _runs(found))
     runs = ", ".join(map(str, found.processing.get("runs", ())))
     lead = (
-        f"Made by `excite diagnose` in {found.seconds:.1f} s, fitted to {runs or 'the data'}, held "
-        f"out: {found.held_out_run}. To go on with the extended model, `excite diagnose … --apply "
-        "NEW.yaml` writes this configuration with the effects that were found."
+        f"Made in {found.seconds:.1f} s by `{found.processing.get('command', 'excite diagnose')}`, "
+        f"fitted to {runs or 'the data'}, held out: {found.held_out_run}."
     )
+    if "--apply" not in str(found.processing.get("command")):
+        lead += (
+            " To go on with the extended model, `excite diagnose … --apply NEW.yaml` writes this "
+            "configuration with the effects that were found."
+        )
     return Section("diagnosis-data", "Data and choices", tuple(blocks), lead)
 
 
@@ -296,10 +303,11 @@ def _within(name: str, runs: Sequence[str]) -> bool:
 
 
 def _own(record: EffectRecord) -> str:
-    return f"{record.kind} on {', '.join(record.joints)}"
+    return f"{title_of(record.kind)} on {', '.join(record.joints)}"
 
 
-SECTIONS: list[Callable[[Diagnosis, Detail], Section]] = [
+WITH_ROBOT: tuple[Callable[..., Section], ...] = (found_section, errors_section)
+SECTIONS: list[Callable[..., Section]] = [
     found_section,
     errors_section,
     _time_section,
@@ -312,14 +320,20 @@ SECTIONS: list[Callable[[Diagnosis, Detail], Section]] = [
 ]
 
 
-def _next(found: Diagnosis, experiment: dict[str, Any], config: str, file: str | None) -> Parts:
+def _next(found: Diagnosis, config: str, data: Sequence[str | Path], file: str | None) -> Parts:
     """What to do next, with the `file` of the diagnosis: commands that can be typed."""
+    given = (as_word(config), *map(as_word, data))
+    if set_up_is_open(found):
+        return ["Next: resolve the doubt about the set-up:", Command(("excite", "inspect", *given))]
     if file is None:
-        return ["Next: repeat with -o DIAGNOSIS.h5, for a report and for the next motion."]
+        again = Command(("excite", "diagnose", *given, "-o", "DIAGNOSIS.h5"))
+        return ["Next: keep it in a file, for a report and the next motion:", again]
     if found.complete:
-        return ["Next, with other data:", Command(("excite", "score", as_word(file), "DATA.h5"))]
+        score = Command(("excite", "score", as_word(file), "DATA.h5"))
+        return ["Next: see whether the model holds for other data:", score]
     return [
-        f"Next: plan a motion, to {purpose(experiment['purpose'], len(experiment['pairs']))}:",
+        f"Next: look at the evidence; plan a motion, to {purpose(found)}:",
+        Command(("excite", "report", as_word(file))),
         next_command(config, file),
     ]
 

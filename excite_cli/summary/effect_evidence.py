@@ -14,6 +14,7 @@ from excite_cli.diagnosis.words import (
     held_out_in_words,
     p_in_words,
     place_in_words,
+    title_of,
     value_in_words,
 )
 from excite_cli.effects.base import Effect, Picture
@@ -65,7 +66,7 @@ def effect_plots(
         if trace is None:
             continue
         place = place_in_words(named.effect, len(found.joint_names))
-        title = f"{named.effect.kind}: {place}"
+        title = f"{title_of(named.effect.kind)}: {place}"
         for row, joint in enumerate(trace.rows):
             cloud = cloud_of(trace, row, units[joint])
             if not len(cloud.x):

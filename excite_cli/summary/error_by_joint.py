@@ -6,7 +6,7 @@ from math import isnan, nan
 import numpy as np
 
 from excite_cli.diagnosis.records import Diagnosis
-from excite_cli.diagnosis.words import assumption_in_words, counted, ends_in_words
+from excite_cli.diagnosis.words import assumption_in_words, counted, ends_in_words, title_of
 from excite_cli.geometry.link_meshes import Poses
 from excite_cli.identification.errors_of_torque import Errors
 from excite_cli.identification.fit_words import above_the_floor
@@ -24,6 +24,10 @@ _OFF = "change by effect (pp)"
 _NAMED, _WORTH = 3, 0.1  # parts that are named in a row, and the least share of the fall
 _NOTHING = 5e-4
 _SEEN = 0.005  # share of the first error below which a part is one of the others
+REPEATABILITY = (
+    "Repeatability: RMS of what changes from one repetition of a motion to the next. No model "
+    "leaves less, unless it knows why."
+)
 _LINES = ("URDF untouched", "declared model, refitted", "with effects")
 
 
@@ -36,6 +40,7 @@ def errors_section(found: Diagnosis, detail: Detail, robot: Robot | None = None)
     blocks += error_tables(found, detail)
     above = above_the_floor(found.after, found.noise_floor)
     blocks += [above] if above else []
+    blocks += [REPEATABILITY] if found.noise_floor and detail == Detail.PAGE else []
     blocks += [ends_in_words(part) for part in found.parts]
     blocks += [f"Assumed: {assumption_in_words(each)}" for each in found.assumed]
     blocks.append(_verdict(found))
@@ -87,7 +92,7 @@ def _moving(found: Diagnosis) -> Table:
     for joint, unit in _joints(found):
         row = _row(found, joint, unit, moving=True)
         if found.noise_floor is not None:
-            row["noise floor"] = figure(found.noise_floor.get(joint, nan))
+            row["repeatability"] = figure(found.noise_floor.get(joint, nan))
         if _has_parts(found):
             row[_OFF] = _taken_off(found, joint)
         rows.append(row)
@@ -159,7 +164,7 @@ def parts_of(found: Diagnosis, joint: str) -> list[tuple[str, float]]:
     everything = len(found.joint_names)
     parts = [
         (
-            each.effect.kind
+            title_of(each.effect.kind)
             if each.effect.joints == (joint,) and not each.effect.runs and not each.effect.covariate
             else what_and_where(each.effect, everything),
             each.parts.get(joint, 0.0),

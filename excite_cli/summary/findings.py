@@ -25,7 +25,8 @@ _WORDS = {
     "standstill_share": "samples left out at standstill and reversals",
     "invalid_share": "samples left out as invalid",
     "noise_orders": "order of the noise model",
-    "noise_rms": "noise that the model leaves [N·m; N]",
+    "noise_rms": "residual that counts as noise in tests, RMS [N·m; N]",
+    "command": "command",
 }
 _SHARES = ("standstill_share", "invalid_share")
 

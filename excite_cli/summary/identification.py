@@ -29,13 +29,11 @@ from excite_cli.shown.answer import (
     Answer,
     Block,
     Charts,
-    Command,
     KeyFigure,
     Parts,
     Section,
     Table,
     Text,
-    as_word,
     show,
 )
 from excite_cli.summary.cells import (
@@ -108,15 +106,8 @@ def identification_answer(
 ) -> Answer:
     """What `excite identify` answers; `written` are the files that were requested, by kind."""
     files = {kind: str(path) for kind, path in written.items() if path is not None}
-    parts = (*identification_parts(found), *files_in_words(files), *_next(found, files.get("fit")))
+    parts = (*identification_parts(found), *files_in_words(files))
     return Answer(parts, {**_data(found), "output": files})
-
-
-def _next(found: Identification, file: str | None) -> Parts:
-    """What to do next with the `file` of the fit, unless a finding says it."""
-    if file is None or any(each.kind == "much_left" for each in found.findings):
-        return []
-    return ["Next, with other data:", Command(("excite", "score", as_word(file), "DATA.h5"))]
 
 
 def identification_parts(found: Identification) -> Parts:

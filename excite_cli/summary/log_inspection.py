@@ -142,18 +142,25 @@ def _parts(
     if page is not None:
         parts.append(f"Written: {page} (page).")
     files = tuple(map(as_word, data))
+    diagnose = "Next: find what the model lacks:"
     if applied is not None:
         what = (
             f"with {written(found.settings)}" if found.settings else "in which nothing is changed"
         )
         parts.append(f"Written: {applied}, {what}.")
-        parts.append(Command(("excite", "diagnose", as_word(applied), *files)))
+        if files:
+            parts += [diagnose, Command(("excite", "diagnose", as_word(applied), *files))]
+        else:
+            parts += ["Next: plan motions:", Command(("excite", "optimize", as_word(applied)))]
     elif found.settings and config:
-        parts.append(
-            Command(("excite", "inspect", as_word(config), *files, "--apply", "corrected.yaml"))
-        )
+        again = ("excite", "inspect", as_word(config), *files, "--apply", "corrected.yaml")
+        parts += ["Next: write the config that says so:", Command(again)]
     elif files and found.good:
-        parts.append(Command(("excite", "diagnose", as_word(config), *files)))
+        parts += [diagnose, Command(("excite", "diagnose", as_word(config), *files))]
+    elif found.good:
+        parts += ["Next: plan motions:", Command(("excite", "optimize", as_word(config)))]
+    else:
+        parts.append("Next: see to the faults above, and inspect again.")
     return parts
 
 

@@ -4,6 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import nan
 
+import numpy as np
+
+from excite_cli.arrays import Array
 from excite_cli.diagnosis.answer_words import FRICTION
 from excite_cli.diagnosis.records import (
     Diagnosis,
@@ -24,10 +27,14 @@ from excite_cli.diagnosis.words import (
     p_in_words,
     place_in_words,
     settled_in_words,
+    title_of,
     value_in_words,
     weighed_in_words,
 )
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.identification.fit_words import with_deviation
+from excite_cli.identification.link_changes import body_names
+from excite_cli.robot.model import Robot
 from excite_cli.shown.answer import Detail, Parts, Section, Table
 from excite_cli.summary.cells import percent, points
 
@@ -86,19 +93,48 @@ _LACKING = (
 )
 _MOST_ABSORBED = 6  # rows that a page shows without being opened
 _MOST_SURROGATES = 4
+_MOST_BODIES = 8
+_SAME_MASS, _SAME_CENTRE = 0.01, 1.0  # of the mass; mm: less is no change worth a row
 _SURROGATES = "Surrogate terms (they approximate an effect that has no name)"
 
 
-def found_section(found: Diagnosis, detail: Detail) -> Section:
-    """What was found, absorbed and approximated, and the sentences about them."""
+def found_section(found: Diagnosis, detail: Detail, robot: Robot | None = None) -> Section:
+    """What was found, absorbed and approximated, and the sentences about them.
+
+    With the `robot` also the bodies that are not as in its URDF.
+    """
     parts: Parts = effect_parts(found, detail) if found.effects else []
     parts += approximation_parts(found, detail)
     curved = any(line.curved for line in found.friction_lines)
     parts += [friction_table(found.friction_lines)] if detail and curved else []
     parts += [*changes_in_words(found), *absorbed_parts(found)]
-    declared = ", ".join(dict.fromkeys(record.kind for record in found.declared))
+    parts += [] if robot is None else body_parts(robot, found.phi)
+    declared = ", ".join(dict.fromkeys(title_of(record.kind) for record in found.declared))
     lead = f"Declared: {declared or 'no effect beside the rigid bodies'}."
     return Section("diagnosis-found", "What was found", tuple(parts), lead)
+
+
+def body_parts(robot: Robot, phi: Array) -> Parts:
+    """Bodies whose mass or centre of mass in φ (P,) is not the URDF's, before and after."""
+    given, rows = standard_parameters(robot).reshape(-1, 10), []
+    for body, (before, after) in enumerate(zip(given, phi.reshape(-1, 10), strict=True)):
+        centres = [
+            1e3 * each[1:4] / each[0] if each[0] else 1e3 * each[1:4] for each in (before, after)
+        ]
+        moved = float(np.abs(centres[1] - centres[0]).max())
+        if abs(after[0] - before[0]) > _SAME_MASS * before[0] or moved > _SAME_CENTRE:
+            was, now = (", ".join(f"{round(x)}" for x in each) for each in centres)
+            row = {"link": body_names(robot, body)[0], "mass, URDF [kg]": f"{before[0]:.4g}"}
+            row |= {"mass, model [kg]": f"{after[0]:.4g}", "centre x, y, z, URDF [mm]": was}
+            rows.append(row | {"centre, model [mm]": now})
+    if not rows:
+        return ["Bodies: masses and centres of mass are those of the URDF."]
+    note = (
+        "Data determine sums over bodies; how these divide is the URDF's as far as possible. The "
+        "standard deviations are in the answer of `excite identify` with the config of --apply."
+    )
+    title = f"Bodies of the model that are not as in the URDF ({len(rows)} of {len(given)})"
+    return [Table.of(title, rows, left=("link",), note=note, folded=len(rows) > _MOST_BODIES)]
 
 
 def effect_parts(found: Diagnosis, detail: Detail) -> Parts:
@@ -152,7 +188,7 @@ def effect_table(
     for named in shown:
         sizes = (value_in_words(name, value) for name, value in named.parameters.items())
         row = {
-            "effect": named.effect.kind,
+            "effect": title_of(named.effect.kind),
             "where": place_in_words(named.effect, everything),
             "size ± std": "\n".join(sizes),
         }
@@ -173,9 +209,9 @@ def other_names(named: NamedEffect, everything: int) -> list[str]:
     what, found = what_and_where(named.effect, everything), []
     if named.aliases:
         others = ", ".join(what_and_where(alias, everything) for alias in named.aliases)
-        found.append(f"{what} is indistinguishable from: {others}")
-    if same := other_name_of(named.effect.kind):
-        found.append(f"{what} produces the same torque as {' and '.join(same)}")
+        found.append(f"{_capital(what)} is indistinguishable from: {others}")
+    if same := [title_of(kind) for kind in other_name_of(named.effect.kind)]:
+        found.append(f"{_capital(what)} produces the same torque as {' and '.join(same)}")
     return found
 
 
@@ -188,13 +224,19 @@ def joint_alias_in_words(alias: JointAlias, everything: int) -> str:
     single = len(alias.named) == 1
     if alias.same_torque:
         produce = "produces" if single else "produce"
-        return f"{named} {produce} the same torque as {others}: no motion distinguishes them"
-    return f"{named} {'is' if single else 'are'} indistinguishable from: {others}"
+        return (
+            f"{_capital(named)} {produce} the same torque as {others}: no motion distinguishes them"
+        )
+    return f"{_capital(named)} {'is' if single else 'are'} indistinguishable from: {others}"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def what_and_where(record: EffectRecord, everything: int) -> str:
     """`spring on axis_2`."""
-    return f"{record.kind} on {place_in_words(record, everything)}"
+    return f"{title_of(record.kind)} on {place_in_words(record, everything)}"
 
 
 def approximation_parts(found: Diagnosis, detail: Detail) -> Parts:
@@ -225,7 +267,7 @@ def absorbed_parts(found: Diagnosis) -> Parts:
         return []
     rows = (
         {
-            "effect": each.kind,
+            "effect": title_of(each.kind),
             "where": joints_in_words(each.joints, len(found.joint_names)),
             "confounded with": ", ".join(each.by),
         }

@@ -13,7 +13,7 @@ from excite_cli.geometry.reasons import dropped_in_words
 from excite_cli.proposal.propose import Proposal
 from excite_cli.robot.loops import loops_in_words
 from excite_cli.robot.model import Robot
-from excite_cli.shown.answer import Answer, Command, Parts, Table, as_word, show
+from excite_cli.shown.answer import Answer, Parts, Table, show
 from excite_cli.shown.note import Level, Note
 
 # A proposed config in words.
@@ -32,7 +32,7 @@ def proposal_answer(found: Proposal, source: str, path: str) -> Answer:
         "notes": list(found.notes),
     }
     return Answer(
-        (*proposal_parts(found), path, "next:", Command(("excite", "optimize", as_word(path)))),
+        (*proposal_parts(found), path),
         data,
     )
 
@@ -114,7 +114,7 @@ def problem_parts(problem: Problem) -> Parts:
 
 def _heard(problem: Problem) -> list[str]:
     notes = problem_notes(problem)
-    return [note.sentence for note in notes if note.level is not Level.DETAIL]
+    return [note.sentence for note in notes if note.level.value > Level.DETAIL.value]
 
 
 def _said(text: str) -> Note:

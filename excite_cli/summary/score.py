@@ -131,8 +131,7 @@ def sentences(found: Score) -> list[str]:
         told.append(f"and {more} more: see the table")
     count = f"{len(found.alarms)} of {len(found.runs)}"
     alarm = f"{count} runs exceed the model's tolerance. {'. '.join(told)}."
-    after = "Next: diagnose these data with the model's config (excite diagnose CONFIG DATA)."
-    return [alarm, first, *_not_judged(found), after]
+    return [alarm, first, *_not_judged(found)]
 
 
 def _not_judged(found: Score) -> list[str]:

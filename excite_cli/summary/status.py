@@ -68,10 +68,9 @@ def _sized(named: NamedEffect, found: Diagnosis) -> str:
 def _next(found: Diagnosis) -> KeyFigure:
     warned = [each for each in found.findings if each.severity == "warning"]
     left = found.joints_with_residual
-    doubtful = any(each.kind == OPEN_SETUP for each in warned)
+    doubtful = set_up_is_open(found)
     value, anchor = "plan a motion", "diagnosis-next"
-    experiment = next_experiment(found)
-    said = [f"to {purpose(experiment['purpose'], len(experiment['pairs']))}"]
+    said = [f"to {purpose(found)}"]
     if doubtful:
         value, anchor, said = "resolve the set-up", "diagnosis-data", ["with excite inspect"]
     elif found.complete:
@@ -91,8 +90,17 @@ def _next(found: Diagnosis) -> KeyFigure:
     return KeyFigure("what next", value, "\n".join(said), verdict, anchor)
 
 
-def purpose(what: str, pairs: int) -> str:
+def set_up_is_open(found: Diagnosis) -> bool:
+    """Whether the set-up is in doubt, which comes before all else."""
+    return any(each.kind == OPEN_SETUP for each in found.findings)
+
+
+def purpose(found: Diagnosis) -> str:
     """What the next motion is for, after `to`."""
-    if what == "separate":
-        return f"distinguish {counted(pairs, 'pair')} of effects"
-    return "excite the model with what was found"
+    experiment = next_experiment(found)
+    if experiment["purpose"] == "separate":
+        return f"distinguish {counted(len(experiment['pairs']), 'pair')} of effects"
+    if not found.effects:
+        return "show more of what no effect explains"
+    effects = counted(len(found.effects), "effect")
+    return f"determine the extended model ({effects}) more exactly"

@@ -87,5 +87,9 @@ class Shade:
 
     def at(self, points: Array) -> Array:
         """Light (K,) on points (K, 3) of the ground."""
-        places = ((points[:, :2] - self.low) / self.edge).T
-        return np.asarray(map_coordinates(self.values, places, order=1, cval=1.0))
+        places = (points[:, :2] - self.low) / self.edge
+        last = np.array(self.values.shape) - 1
+        here = np.flatnonzero(((places >= 0) & (places <= last)).all(axis=1))
+        found = np.ones(len(points))
+        found[here] = map_coordinates(self.values, places[here].T, order=1)
+        return found

@@ -60,8 +60,12 @@ class Marks:
             self._mass(pen, instants, instant)
         if distance and instants.nearest is not None:
             words.append(self._distance(pen, instants, instant))
-        layer = layer.resize(image.size, library.Resampling.BOX)
-        image.paste(layer, (0, 0), layer)
+        if (drawn := layer.getbbox()) is not None:
+            left, top = drawn[0] // _FINER, drawn[1] // _FINER
+            right, bottom = -(-drawn[2] // _FINER), -(-drawn[3] // _FINER)
+            box = tuple(_FINER * each for each in (left, top, right, bottom))
+            layer = layer.reduce(_FINER, box)
+            image.paste(layer, (left, top), layer)
         text = pillow_part("ImageDraw").Draw(image)
         for place, word, colour in words:
             self._write(text, place, word, colour, anchor="lm")

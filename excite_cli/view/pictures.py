@@ -26,7 +26,7 @@ from excite_cli.workers.base import Here, News, Workers
 Told = Callable[[str, int], None]
 Said = Callable[[str], None]
 
-_DETAIL = 0.8  # detail smaller than this many pixels is dropped
+_DETAIL, _DETAIL_MOVING = 0.8, 1.2  # detail smaller than so many pixels is dropped
 _SEEN = 40  # instants that tell how far a motion reaches
 _COLOURS = 255  # of a GIF, the same for all frames, so that nothing flickers
 _SAMPLED = 6  # frames that the colours are chosen from
@@ -119,7 +119,7 @@ def motion_gif(
     count = frame_count(frames_per_second, seconds)
     instants = instants_of(problem, segment, _frame_times(segment, count))
     path = _path(segment)
-    scene = build_scene(problem, [path], _cell(problem, path, view))
+    scene = build_scene(problem, [path], _cell(problem, path, view, _DETAIL_MOVING))
     if scene.note:
         say(scene.note)
     camera = fitted_camera(
@@ -211,7 +211,9 @@ def _palette(pixels: NDArray[np.uint8]) -> Any:
     greys of the ground if all pixels counted the same.
     """
     library = pillow_part("Image")
-    shades, counts = np.unique(pixels, axis=0, return_counts=True)
+    red, green, blue = pixels.astype(np.int64).T
+    packed, counts = np.unique((red << 16) + (green << 8) + blue, return_counts=True)
+    shades = np.stack([packed >> 16, packed >> 8, packed], axis=1).astype(np.uint8)
     repeated = np.repeat(shades, np.ceil(np.sqrt(counts)).astype(int), axis=0)
     exact = np.round(255 * np.array([PAPER, NEAREST, CAPSULE, REGION])).astype(int)
     count = _COLOURS - len(exact)
@@ -227,10 +229,10 @@ def _path(segment: Segment) -> Array:
     return segment.trajectory.states(times, segment.coefficients)[0]
 
 
-def _cell(problem: Problem, path: Array, view: View) -> float:
+def _cell(problem: Problem, path: Array, view: View, detail: float = _DETAIL) -> float:
     """What a pixel is about as wide as [m]: the robot fills most of a picture."""
     places = Poses.of(problem.robot, path).translations.reshape(-1, 3)
-    return _DETAIL * max(float(np.linalg.norm(np.ptp(places, axis=0))), 0.1) / max(view.size)
+    return detail * max(float(np.linalg.norm(np.ptp(places, axis=0))), 0.1) / max(view.size)
 
 
 def _framed(scene: Scene, shown: list[Array], instants: Instants) -> Array:

@@ -96,7 +96,7 @@ def build_scene(problem: Problem, paths: list[Array], cell: float = 0.0) -> Scen
         bodies=bodies,
         capsules=capsules,
         capsule_surfaces=tuple(
-            smooth_surface(capsule_triangles(c.start, c.end, c.radius)) for c in capsules
+            smooth_surface(capsule_triangles(c.start, c.end, c.radius), cell) for c in capsules
         ),
         boxes=boxes,
         walls=tuple(o for o in obstacles if isinstance(o, Plane) and o.name != FLOOR),

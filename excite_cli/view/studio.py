@@ -97,6 +97,7 @@ class Lights:
 
 
 BOX_COLOUR: Colour = (0.86, 0.80, 0.70)
+_ALIKE = 0.995  # cosine of normals that are lit alike
 _FOLD = 0.88  # cosine of normals of neighbouring pixels below which there is an edge
 _STEPS = 8192  # of light that colours tell apart
 _STEP = 0.03  # share of the distance by which neighbouring pixels differ at an edge
@@ -109,15 +110,19 @@ _PLACES = {
 
 @dataclass(frozen=True)
 class Quality:
-    """Rays for each pixel on an edge (4 or 8), towards the lamp and the sky; patches of shade."""
+    """Rays for each pixel on an edge (4 or 8), towards the lamp and the sky; patches of shade.
+
+    lift: how far such rays start off a surface, as a share of the scene: more for coarse meshes.
+    """
 
     edge_rays: int = 8
     lamp_rays: int = 10
     sky_rays: int = 28
     patches: int = 200
+    lift: float = 1e-4
 
 
-FINE, QUICK = Quality(), Quality(4, 4, 8, 110)
+FINE, QUICK = Quality(), Quality(4, 3, 5, 72, 1e-3)
 
 
 class Studio:
@@ -142,7 +147,7 @@ class Studio:
         self._panes = wall_panes(scene)
         if scene.region is not None:
             self._panes.append(region_pane(scene.region))
-        self._lift = 1e-4 * scene.size
+        self._lift = quality.lift * scene.size
 
     def picture(
         self,
@@ -156,22 +161,31 @@ class Studio:
         capsules: indices and colours of those to be shown; ghosts: where else the robot is shown,
         faintly.
         """
-        moving = Tracer(self._placed(poses, instant), self._first_moving)
+        shown = self._placed(poses, instant)
+        moving = Tracer(shown, self._first_moving)
         panes = [*self._panes]
         if capsules:
-            panes.append(self._capsule_pane(poses, instant, capsules))
+            surfaces = self._capsule_surfaces(poses, instant, capsules)
+            colours = np.array([colour for _, colour in capsules])
+            panes.append(Pane(Tracer(surfaces), colours, 0.07, 0.5))
+            shown = [*shown, *surfaces]
         if ghosts is not None and len(ghosts):
             bodies = [one for t in range(len(ghosts)) for one in self._placed(ghosts, t)]
             panes.append(Pane(Tracer(bodies), np.array([GHOST] * len(bodies)), 0.16, 0.5))
+            shown = [*shown, *bodies]
         width, height = self._camera.width, self._camera.height
         view = _Instant(moving, panes, self._shade(moving))
-        colour, keys = self._seen(view, self._whole)
+        colour, keys = self._of_ground(view.shade)
+        near = np.flatnonzero(self._near(shown))
+        colour[near], keys[near], light = self._seen(view, self._whole.part(near))
         at = np.flatnonzero(_edges(keys, height, width))
         y, x = np.divmod(at, width)
+        lit = np.full(width * height, np.nan)
+        lit[near] = light
         places = _PLACES[self._quality.edge_rays] / 16
         total = np.zeros((len(at), 3))
         for across, down in places:
-            total += self._seen(view, self._sight(x + across, y + down))[0]
+            total += self._seen(view, self._sight(x + across, y + down), keys[at], lit[at])[0]
         colour[at] = total / len(places)
         return _bytes(colour).reshape(height, width, 3)
 
@@ -188,6 +202,43 @@ class Studio:
         width, height = self._camera.width, self._camera.height
         y, x = np.divmod(np.arange(width * height), width)
         return self._sight(x + 0.5, y + 0.5)
+
+    @cached_property
+    def _bare(self) -> tuple[NDArray[np.intp], Array, Array]:
+        """Pixels of the ground where nothing stands on it, its places, and what tells edges."""
+        below = self._whole.below
+        ground = np.flatnonzero(np.isfinite(below))
+        keys = np.zeros((len(below), 6))
+        keys[:, 0], keys[:, 5] = np.where(np.isfinite(below), -2, -1), 1.0
+        places = self._camera.eye + below[ground, None] * self._whole.directions[ground]
+        return ground, places, keys
+
+    def _of_ground(self, shade: Shade) -> tuple[Array, Array]:
+        """Linear colours, and what tells edges, of all pixels if only the ground were there."""
+        ground, places, keys = self._bare
+        colour = self._whole.paint.copy()
+        colour[ground] *= shade.at(places)[:, None]
+        return colour, keys.copy()
+
+    @cached_property
+    def _standing(self) -> NDArray[np.bool_]:
+        """Pixels (height·width,) where something that never moves is."""
+        whole = self._whole
+        origins = np.broadcast_to(self._camera.eye, whole.directions.shape)
+        panes = [pane.tracer.first_hits(origins, whole.directions) for pane in self._panes]
+        return np.any([np.isfinite(each.distance) for each in (whole.still, *panes)], axis=0)
+
+    def _near(self, shown: Sequence[Surface]) -> NDArray[np.bool_]:
+        """Pixels (height·width,) where something other than the ground may be seen."""
+        width, height = self._camera.width, self._camera.height
+        found = self._standing.reshape(height, width).copy()
+        for one in shown:
+            if len(one.points):
+                places = self._camera.project(one.points)
+                low = np.maximum(np.floor(places.min(axis=0)).astype(int) - 1, 0)
+                high = np.maximum(np.ceil(places.max(axis=0)).astype(int) + 1, 0)
+                found[low[1] : high[1], low[0] : high[0]] = True
+        return found.ravel()
 
     def _sight(self, x: Array, y: Array) -> "_Sight":
         directions = self._camera.rays(x, y)
@@ -211,19 +262,29 @@ class Studio:
             for body in self._moving
         ]
 
-    def _capsule_pane(
+    def _capsule_surfaces(
         self, poses: Poses, instant: int, capsules: Sequence[tuple[int, Colour]]
-    ) -> Pane:
+    ) -> list[Surface]:
         surfaces = []
         for index, _ in capsules:
             joint = self._scene.capsules[index].joint
             surface = self._scene.capsule_surfaces[index]
             place = poses.rotations[instant, joint], poses.translations[instant, joint]
             surfaces.append(surface.moved(*place))
-        return Pane(Tracer(surfaces), np.array([colour for _, colour in capsules]), 0.07, 0.5)
+        return surfaces
 
-    def _seen(self, view: "_Instant", sight: "_Sight") -> tuple[Array, Array]:
-        """Linear colours (K, 3), and what tells edges (K, 6)."""
+    def _seen(
+        self,
+        view: "_Instant",
+        sight: "_Sight",
+        middle: Array | None = None,
+        lit: Array | None = None,
+    ) -> tuple[Array, Array, Array]:
+        """Linear colours (K, 3), what tells edges (K, 6), and light (K,) on what is no ground.
+
+        In the middle of the same pixels: what tells edges (K, 6), and the light (K,) that is taken
+        from there where a ray meets the same surface at nearly the same angle.
+        """
         eye, directions = self._camera.eye, sight.directions
         origins = np.broadcast_to(eye, directions.shape)
         hits = _nearer(sight.still, view.moving.first_hits(origins, directions))
@@ -235,11 +296,16 @@ class Studio:
         places = eye + below[on_ground, None] * directions[on_ground]
         colour[on_ground] *= view.shade.at(places)[:, None]
         met = np.flatnonzero(hits.distance < below)
-        places = eye + hits.distance[met, None] * directions[met]
         blockers = (self._still, view.moving)
-        light = self._lights.on(places, hits.normal[met], blockers, self._lift)
+        light = np.full(len(directions), np.nan)
+        if middle is not None and lit is not None:
+            angle = np.einsum("kx,kx->k", hits.normal, middle[:, 3:])
+            light = np.where((hits.part == middle[:, 0]) & (angle > _ALIKE), lit, np.nan)
+        new = met[np.isnan(light[met])]
+        starts = eye + hits.distance[new, None] * directions[new]
+        light[new] = self._lights.on(starts, hits.normal[new], blockers, self._lift)
         shine = self._lights.gloss(hits.normal[met], directions[met])
-        colour[met] = (self._albedo[hits.part[met]] + shine[:, None]) * light[:, None]
+        colour[met] = (self._albedo[hits.part[met]] + shine[:, None]) * light[met, None]
         seen = np.minimum(hits.distance, below)
         layers = np.zeros(len(seen))
         for pane in view.panes:
@@ -254,7 +320,7 @@ class Studio:
         keys[:, 0] = np.where(solid, hits.part, np.where(np.isfinite(below), -2, -1))
         keys[:, 1], keys[:, 2] = layers, np.where(solid, seen, 0.0)
         keys[:, 3:] = np.where(solid[:, None], hits.normal, [0.0, 0.0, 1.0])
-        return colour, keys
+        return colour, keys, light
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,6 +331,11 @@ class _Sight:
     still: Hits
     below: Array
     paint: Array
+
+    def part(self, at: NDArray[np.intp]) -> "_Sight":
+        """Those of some rays."""
+        still = Hits(self.still.distance[at], self.still.part[at], self.still.normal[at])
+        return _Sight(self.directions[at], still, self.below[at], self.paint[at])
 
 
 @dataclass(frozen=True, eq=False)
@@ -295,7 +366,9 @@ def _edges(keys: Array, height: int, width: int) -> NDArray[np.bool_]:
         ((slice(1, None), slice(None)), (slice(None, -1), slice(None))),
     ):
         differ = (part[one] != part[other]) | (layer[one] != layer[other])
-        differ |= np.einsum("yxk,yxk->yx", normal[one], normal[other]) < _FOLD
+        y, x = np.nonzero(~differ & (part[one] >= 0))  # elsewhere a level plane, or an edge already
+        bend = np.einsum("kx,kx->k", normal[one][y, x], normal[other][y, x])
+        differ[y, x] |= bend < _FOLD
         differ |= np.abs(depth[one] - depth[other]) > _STEP * depth[one]
         found[one] |= differ
         found[other] |= differ

@@ -55,10 +55,10 @@ def test_a_fit_that_was_read(loop: Loop) -> None:
 
 def test_a_diagnosis_is_told_as_by_the_program() -> None:
     found = make_diagnosis(rivals=())
-    assert "viscous_friction on " in repr(found)
+    assert "viscous friction on " in repr(found)
     assert "mean error" in repr(found)
     answer = diagnosis_answer(found, "arm.yaml", {"diagnosis": "d.h5", "config": None})
-    for part in answer.parts[:-4]:  # but for what the program says of itself
+    for part in answer.parts[:-5]:  # but for what the program says of itself
         assert escape(part if isinstance(part, str) else part.title) in html_of(found)
     assert answer.parts[-1] == Command(("excite", "optimize", "arm.yaml", "--after", "d.h5"))
     assert answer.data["output"] == {"diagnosis": "d.h5"}

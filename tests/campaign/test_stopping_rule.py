@@ -71,7 +71,7 @@ def test_a_name_that_does_harm_is_open(found: Diagnosis, worse: float, open_: bo
         },
     )
     told = still_open(replace(found, effects=(named,)), ())
-    words = "viscous_friction on elbow: the newest motion is predicted worse with it"
+    words = "viscous friction on elbow: the newest motion is predicted worse with it"
     assert told == (words,) * open_
 
 

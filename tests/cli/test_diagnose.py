@@ -159,8 +159,8 @@ def test_the_new_config_needs_nothing_more(outcome: Outcome, excite: Program) ->
 def test_people_get_tables(outcome: Outcome, excite: Program) -> None:
     run = excite.good("diagnose", SMOKE, outcome.data, *QUICK, "--held-out", "motion_1_take_1")
     for words in (
-        "What the declared model lacks", "coulomb_friction", "N·m",
-        "Error of the torque on held-out data (motion_1_take_1)", "Next: repeat with -o",
+        "What the declared model lacks", "Coulomb friction", "N·m",
+        "Error of the torque on held-out data (motion_1_take_1)", "Next: keep it in a file",
     ):  # fmt: skip
         assert words in run.stdout
     assert list(excite.folder.iterdir()) == []  # nothing is written unasked
@@ -171,7 +171,7 @@ def test_overwrite_replaces(outcome: Outcome, excite: Program) -> None:
     path.write_text("old")
     run = excite.good("diagnose", SMOKE, outcome.data, *QUICK, "-o", path, "--overwrite", "-q")
     assert run.stderr == ""
-    assert "Next: plan a motion" in run.stdout
+    assert "plan a motion, to " in run.stdout
     assert {e.effect.kind for e in read_diagnosis(path).effects} == {kind for kind, _ in PLANTED}
 
 

@@ -43,7 +43,7 @@ def test_files_are_named_after_the_result_and_never_overwritten(
     words = ("export", two_motions.path, "-f", name, "--motion", "2", "--rate", "50")
     suffix = {"csv": ".csv", "ros2": ".yaml", "moveit": ".json", "npz": ".npz"}.get(name, "")
     path = excite.folder / f"arm_motion_2{suffix}"
-    written, missing = excite.good(*words).stdout.splitlines()
+    written, missing, *_ = excite.good(*words).stdout.splitlines()
     assert written == f"{path.name}: motion_2, 301 samples, 6 s"
     assert missing.startswith("Not modelled: the floor and all else around the robot")
     before = read_own_motion(path)

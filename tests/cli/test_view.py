@@ -33,6 +33,8 @@ def test_writes_a_gif(two_joints: Path, excite: Program) -> None:
     answer = excite.answer("view", two_joints, "--gif", "arm.gif", *SMALL, *words)
     assert (answer["frames"], answer["seconds"]) == (3, 0.6)
     assert (excite.folder / "arm.gif").read_bytes().startswith(b"GIF89a")
+    told = excite.good("view", two_joints, "--gif", "arm.gif", *SMALL, *words, "--overwrite").stdout
+    assert "Not modelled: the floor and all else around the robot" in told
 
 
 def test_a_motion_that_is_no_result_needs_a_config(two_joints: Path, excite: Program) -> None:
@@ -88,7 +90,8 @@ def test_a_missing_library_names_the_extra(
 
 def test_ctrl_c_exits_with_status_0(two_joints: Path, excite: Program) -> None:
     pytest.importorskip("viser")
-    process = excite.start("view", two_joints, "--no-open", "--json", "--port", "18080")
+    words = ("--no-open", "--json", "--no-progress", "--port", "18080")
+    process = excite.start("view", two_joints, *words)
     try:
         assert process.stdout is not None
         answer = json.loads(process.stdout.readline())

@@ -78,7 +78,8 @@ def test_it_ends_by_itself_with_a_model_that_can_be_used(
     place, answer = done
     assert answer["ended"] == "complete", answer["reason"]
     last = answer["rounds"][-1]["learned"]
-    assert set(last["effects"]) == {"spring on elbow", "coulomb_friction on shoulder_pitch"}
+    found = {"spring at the joint on elbow", "Coulomb friction on shoulder_pitch"}
+    assert set(last["effects"]) == found
     assert last["after"] < 0.01 < last["before"]
     names = [motion["name"] for each in answer["rounds"] for motion in each["motions"]]
     assert (place / "played.txt").read_text().split() == names
@@ -87,7 +88,7 @@ def test_it_ends_by_itself_with_a_model_that_can_be_used(
     declared = {each.kind for each in load_case(place / answer["model"]).spec.effects or ()}
     assert {"spring", "coulomb_friction"} <= declared
     page = Path(place / answer["page"]).read_text(encoding="utf-8")
-    assert "spring on elbow" in page
+    assert "spring at the joint on elbow" in page
     assert "Converged: " in page
     motion = place / "campaign" / "round_1_motion_1.csv"
     assert motion.read_text().startswith("t,q_shoulder_yaw,")
@@ -236,7 +237,9 @@ def test_a_simulated_robot_has_the_drives_of_the_config(folder: Path, cache: Pat
     )
     assert found.stdout, found.stderr
     answer = json.loads(found.stdout)
-    assert "spring on elbow" in answer["rounds"][-1]["learned"]["effects"], found.stderr
+    assert "spring at the joint on elbow" in answer["rounds"][-1]["learned"]["effects"], (
+        found.stderr
+    )
     with h5py.File(next((folder / "drives").glob("*_log.h5"))) as file:
         drive = json.loads(file.attrs["truth"])["drive"]
         (run,) = file["runs"].values()

@@ -16,7 +16,7 @@ from excite_cli.api.simulating import SimulationSettings
 from excite_cli.campaign import inbox, measure_command
 from excite_cli.campaign.same_motion import record_measured
 from excite_cli.campaign.supervisor import ProgramExit
-from excite_cli.shown.note import Note
+from excite_cli.shown.note import Level, Note
 from tests.campaign.campaign_process import PATIENCE, until
 from tests.cli.program import Program
 from tests.end_to_end.conftest import state_of, with_program
@@ -158,6 +158,10 @@ def test_an_inbox_takes_whole_logs_of_its_motion_and_of_today(
     hear("play ", "round_1_motion_3.csv")
     played(begun.folder / "campaign" / "round_1_motion_3.csv", box / "round_1_motion_3_log.h5")
     campaign.join(PATIENCE)
+    steps = [each.where for each in notes if each.level is Level.STEP]
+    for what in ("round_1_motion_1, measuring (a motion of", "round_1_motion_3, checking the log"):
+        assert any(each.startswith(what) for each in steps), steps
+    assert steps.index("round 1: diagnosing 3 logs") > steps.index(what)
     assert not campaign.is_alive()
     motions = state_of(begun.folder)["rounds"][0]["motions"]
     assert [motion["data"] for motion in motions] == [

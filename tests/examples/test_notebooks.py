@@ -21,7 +21,7 @@ EXPECTED = {
         {"tx40.h5", "tx40.html", "tx40_found.yaml", "figures"},
     ),
     "2-plan-simulate-diagnose": (
-        r"load_dependent_friction on shoulder_pitch: ratio 0\.0(59|60)", {"arm.h5", "diagnosis.h5"},
+        r"load-dependent friction on shoulder_pitch: ratio 0\.0(59|60)", {"arm.h5", "diagnosis.h5"},
     ),
     "3-next-motion-and-export": (
         r"spring.*axis_2", {"kr300.h5", "next.h5", "next.csv", "kr300.c", "kr300.xml"},

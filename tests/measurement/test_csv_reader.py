@@ -176,3 +176,19 @@ def test_any_numbers_survive(tmp_path: Path, table: np.ndarray, separator: str) 
     path.write_text("\n".join(map(separator.join, rows)))
     back = np.column_stack(list(read_table(path).columns.values()))
     np.testing.assert_array_equal(back, table)
+
+
+@pytest.mark.parametrize(
+    ("begins", "words"),
+    [
+        (b"\x89HDF\r\n\x1a\n", "it is an HDF5 file. Name it log.h5 (in a campaign: --log .h5)."),
+        (b"PAR1\xff\x80", "it is a parquet file. Name it log.parquet"),
+        (b"\xff\x80\x81", "codec can't decode"),
+    ],
+)
+def test_a_file_of_another_kind_is_named(tmp_path: Path, begins: bytes, words: str) -> None:
+    path = tmp_path / "log.csv"
+    path.write_bytes(begins + b"\xff\n" * 100)
+    with pytest.raises(FileError, match=r"is not a text table") as told:
+        read_table(path)
+    assert words in str(told.value)

@@ -25,7 +25,7 @@ def test_the_reason_comes_first_and_seconds_add_up() -> None:
         "torque std [σ]": "0.3",
         "effects": "spring on elbow",
     }
-    assert "1 rounds, 1 motions, 12 s of motion" in str(answer.parts[2])
+    assert "1 round, 1 motion, 12 s of motion" in str(answer.parts[2])
     assert answer.parts[-1] == "page: place/page.html"
     assert answer.data["seconds"] == 12.5
     assert answer.data["rounds"][0]["motions"][0]["rejected"] == ["no"]

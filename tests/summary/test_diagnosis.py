@@ -55,11 +55,11 @@ def test_approximations_that_are_not_confirmed_are_one_line(doubted: Diagnosis) 
     first = replace(doubted.effects[0], verdict=HeldOutVerdict.NOT_CONFIRMED)
     found = replace(doubted, effects=(first, *doubted.effects[1:]))
     text = printed(found)
-    assert "Surrogate terms that are not confirmed: viscous_friction on elbow (--verbose" in text
+    assert "Surrogate terms that are not confirmed: viscous friction on elbow (--verbose" in text
     assert "Surrogate terms (" not in text  # no table
     harmful = replace(first, verdict=HeldOutVerdict.HARMFUL)
     told = printed(replace(found, effects=(harmful, *found.effects[1:])))
-    assert "viscous_friction on elbow (harmful) (--verbose" in told
+    assert "viscous friction on elbow (harmful) (--verbose" in told
     tables = [p for p in diagnosis_answer(found, "", {}, True).parts if isinstance(p, Table)]
     assert any(table.title.startswith("Surrogate terms") for table in tables)
 
@@ -80,7 +80,7 @@ def test_other_names_of_the_same_torque_are_told() -> None:
     (named, *others) = found.effects
     effect = replace(named.effect, kind="asymmetric_friction")
     text = printed(replace(found, effects=(replace(named, effect=effect), *others)))
-    assert "produces the same torque as coulomb_friction and torque_offset" in text
+    assert "produces the same torque as Coulomb friction and offset of the measured torque" in text
     assert "the same torque" not in printed(found)
 
 
@@ -89,7 +89,7 @@ def test_the_noise_floor_stands_beside_the_errors(doubted: Diagnosis) -> None:
     floor = {name: 0.25 if name == "elbow" else 0.8 for name in doubted.joint_names[:-1]}
     found = replace(doubted, noise_floor=floor)
     text = printed(found)
-    assert "noise floor" in text
+    assert "repeatability" in text
     assert "1.2 times the noise of repeated periods (elbow 4.0 times)" in text
     rows = text.partition("Error of the torque")[2].splitlines()
     unknown = next(line for line in rows if line.startswith(doubted.joint_names[-1]))
@@ -104,7 +104,10 @@ def test_without_repeated_periods_nothing_is_said_of_noise(doubted: Diagnosis) -
 def test_pairs_that_cannot_be_told_from_one_effect() -> None:
     one, other, pair = (EffectRecord(kind, ("elbow",)) for kind in ("spring", "armature", "ripple"))
     found = replace(make_diagnosis(), joint_aliases=(JointAlias((one,), (other, pair)),))
-    told = "spring on elbow is indistinguishable from: armature on elbow + ripple on elbow"
+    told = (
+        "Spring at the joint on elbow is indistinguishable from: inertia of the motor (armature) "
+        "on elbow + ripple over the angle on elbow"
+    )
     assert told in " ".join(printed(found).split())
     data = diagnosis_answer(found, "arm.yaml", {}).data["joint_aliases"]
     assert data == [
@@ -122,8 +125,8 @@ def test_another_name_of_the_same_torque_is_told_as_such() -> None:
     alias = JointAlias(tuple(parts), (other,))
     found = replace(make_diagnosis(), joint_aliases=(alias,))
     told = (
-        "coulomb_friction on elbow produce the same torque as asymmetric_friction on elbow: no "
-        "motion distinguishes them"
+        "Coulomb friction on elbow produce the same torque as direction-dependent friction on "
+        "elbow: no motion distinguishes them"
     )
     assert told in " ".join(printed(found).split())
     (data,) = diagnosis_answer(found, "arm.yaml", {}).data["joint_aliases"]
@@ -220,7 +223,7 @@ def test_every_effect_shows_what_it_is_worth_on_held_out_data(
     fell = replace(bad, before=replace(bad.before, mean_relative_moving=0.5), effects=tuple(folded))
     text = printed(replace(fell, after=replace(fell.after, mean_relative_moving=0.1)))
     assert "2 small effects (each below 1% of the error reduction)" in text
-    assert "viscous_friction on elbow (not confirmed)" in text
+    assert "viscous friction on elbow (not confirmed)" in text
     assert "harmful, -40.00 pp\n" in text  # whatever it takes off
     elsewhere = replace(bad.effects[0], removes={"slide": ErrorReduction(0.01, 0.02, 0.1)})
     assert "harmful, +2.00 pp on slide\n" in printed(replace(bad, effects=(elsewhere,)))

@@ -61,7 +61,7 @@ def test_errors_are_those_of_the_records(diagnosis: Diagnosis) -> None:
     assert relative.yaxis_inverted()  # the first joint on top
     shown = [tick.get_text() for axes in rms for tick in axes.get_yticklabels()]
     assert sorted(shown) == sorted(joints)
-    ticks = [x for axes in rms for each in axes.lines if each.get_label() == "noise floor"
+    ticks = [x for axes in rms for each in axes.lines if each.get_label() == "repeatability"
              for x in np.asarray(each.get_xdata()) if np.isfinite(x)]  # fmt: skip
     assert ticks == [0.5]
 

@@ -3,10 +3,12 @@
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from excite_cli.config.load_spec import parse_spec
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.records import (
     Approximation,
@@ -18,6 +20,7 @@ from excite_cli.diagnosis.records import (
     NamedEffect,
 )
 from excite_cli.diagnosis.words import approximation_in_words, covariate_in_words
+from excite_cli.dynamics.regressor import standard_parameters
 from excite_cli.effects.base import Value
 from excite_cli.measurement.dataset import Finding
 from excite_cli.report.chart import Chart
@@ -25,6 +28,7 @@ from excite_cli.report.effect_chart import Cloud, law_line
 from excite_cli.report.page import render
 from excite_cli.report.plot import Plot
 from excite_cli.report.residual_chart import noise_by_joint, residuals_in_time
+from excite_cli.robot.model import Robot, build_robot
 from excite_cli.shown.answer import (
     Block,
     Charts,
@@ -42,6 +46,8 @@ from excite_cli.summary.diagnosis import (
     diagnosis_parts,
     diagnosis_sections,
 )
+from excite_cli.summary.error_by_joint import REPEATABILITY
+from excite_cli.summary.named_effects import body_parts
 from excite_cli.summary.status import diagnosis_figures
 from tests.diagnosis.synthetic_diagnosis import make_diagnosis, make_traces
 from tests.report.structure import Structure
@@ -84,9 +90,10 @@ def blocks_of(blocks: tuple[Block, ...]) -> Iterator[Block]:
                 yield from blocks_of(inner)
 
 
-def section_of(found: Diagnosis, topic: str) -> Section:
+def section_of(found: Diagnosis, topic: str, robot: Robot | None = None) -> Section:
     """One section of its page."""
-    return {each.anchor: each for each in diagnosis_sections(found)}[f"diagnosis-{topic}"]
+    sections = diagnosis_sections(found, robot=robot)
+    return {each.anchor: each for each in sections}[f"diagnosis-{topic}"]
 
 
 def charts_of(section: Section) -> list[Chart | Plot]:
@@ -130,7 +137,7 @@ def test_all_parts_are_there_and_the_page_is_sound(
         "diagnosis-unexplained", "diagnosis-next", "diagnosis-candidates", "diagnosis-data",
     ]  # fmt: skip
     for words in (
-        "viscous_friction on elbow is indistinguishable from: nonlinear_viscous_friction on elbow",
+        "Viscous friction on elbow is indistinguishable from: nonlinear viscous friction on elbow",
         "time stamps jitter by 3 %",
     ):
         assert words in structure.text
@@ -149,9 +156,9 @@ def test_every_chart_says_its_finding_in_figures_and_labels_its_axes(
 
 def test_evidence_shows_the_law_and_its_figures(sections: dict[str, Section]) -> None:
     (chart,) = charts_of(sections["diagnosis-evidence"])
-    assert chart.title == "viscous_friction: elbow"
+    assert chart.title == "viscous friction: elbow"
     assert "2.00 ± 0.10 N·m·s/rad" in chart.caption
-    assert "is indistinguishable from: nonlinear_viscous_friction on elbow" in chart.caption
+    assert "is indistinguishable from: nonlinear viscous friction on elbow" in chart.caption
     assert "99.8%" in chart.alternative or "99.9%" in chart.alternative
     assert drawn(chart).startswith("speed [rad/s]")
 
@@ -159,8 +166,15 @@ def test_evidence_shows_the_law_and_its_figures(sections: dict[str, Section]) ->
 @pytest.mark.parametrize(
     ("beside", "told"),
     [
-        ((), "viscous_friction on elbow is indistinguishable from: armature on elbow."),
-        (("spring",), "viscous_friction on elbow + spring on elbow are indistinguishable from: "),
+        (
+            (),
+            "Viscous friction on elbow is indistinguishable from: inertia of the motor (armature) "
+            "on elbow.",
+        ),
+        (
+            ("spring",),
+            "Viscous friction on elbow + spring at the joint on elbow are indistinguishable from: ",
+        ),
     ],
 )
 def test_evidence_tells_of_pairs(diagnosis: Diagnosis, beside: tuple[str, ...], told: str) -> None:
@@ -267,7 +281,7 @@ def test_effects_that_carry_less_than_a_hundredth_of_the_fall_are_folded(
 ) -> None:
     found = section_of(small(diagnosis, part), "found")
     tables = [block for block in found.blocks if isinstance(block, Table)]
-    spring = next(t for t in tables if any(row[0] == "spring" for row in t.rows))
+    spring = next(t for t in tables if any(row[0] == "spring at the joint" for row in t.rows))
     assert spring.folded == folded
 
 
@@ -313,7 +327,7 @@ def test_every_run_is_listed_with_its_use_and_what_is_there_alone(diagnosis: Dia
     )
     assert runs.rows == (
         ("a", "training", "–"),
-        ("b", "training", "viscous_friction on elbow"),
+        ("b", "training", "viscous friction on elbow"),
         ("c", "held-out", "–"),
     )
     parts = {**diagnosis.processing, "runs": ["a", "b/1"]}
@@ -322,7 +336,7 @@ def test_every_run_is_listed_with_its_use_and_what_is_there_alone(diagnosis: Dia
         for block in diagnosis_sections(replace(found, processing=parts))[-1].blocks
         if isinstance(block, Table) and block.title == "Runs"
     )
-    assert [row[2] for row in runs.rows] == ["–", "viscous_friction on elbow", "–"]
+    assert [row[2] for row in runs.rows] == ["–", "viscous friction on elbow", "–"]
     single = replace(found, processing={**processing, "runs": ["a"]})
     blocks = diagnosis_sections(single)[-1].blocks
     assert not any(isinstance(each, Table) and each.title == "Runs" for each in blocks)
@@ -394,3 +408,41 @@ def test_a_law_that_jumps_is_drawn_as_a_step_and_a_line_is_not() -> None:
     far = np.abs(x) > 0.4  # no samples about zero
     gap = replace(line, x=x[far], law=x[far], partial=x[far])
     assert not np.isnan(law_line(gap)[1]).any()
+
+
+def test_bodies_that_changed_stand_with_figures_before_and_after(diagnosis: Diagnosis) -> None:
+    robot = build_robot(parse_spec(diagnosis.config).robot, Path(diagnosis.config_folder))
+    given = standard_parameters(robot)
+    (same,) = body_parts(robot, given)
+    assert same == "Bodies: masses and centres of mass are those of the URDF."
+    phi = given.copy()
+    phi[10:14] *= 1.5  # heavier, with the same centre
+    phi[21] += 0.05 * phi[20]  # 50 mm along x
+    (table,) = body_parts(robot, phi)
+    assert isinstance(table, Table)
+    assert "(2 of 5)" in table.title
+    heavier, moved = (dict(zip(table.columns, row, strict=True)) for row in table.rows)
+    assert float(heavier["mass, model [kg]"]) == pytest.approx(
+        1.5 * float(heavier["mass, URDF [kg]"]), rel=1e-3
+    )
+    assert heavier["centre, model [mm]"] == heavier["centre x, y, z, URDF [mm]"]
+    before, after = (moved[name] for name in ("centre x, y, z, URDF [mm]", "centre, model [mm]"))
+    assert int(after.split(",")[0]) - int(before.split(",")[0]) == 50
+    found = section_of(replace(diagnosis, phi=phi), "found", robot)
+    assert table in found.blocks
+
+
+def test_the_command_line_that_made_it_is_on_the_page(diagnosis: Diagnosis) -> None:
+    line = "excite diagnose arm.yaml log.csv --apply better.yaml"
+    made = replace(diagnosis, processing={**diagnosis.processing, "command": line})
+    lead = section_of(made, "data").lead
+    assert f"by `{line}`" in lead
+    assert "To go on" not in lead  # that was given
+    assert "`excite diagnose … --apply NEW.yaml`" in section_of(diagnosis, "data").lead
+
+
+def test_the_band_says_which_noise_it_is(diagnosis: Diagnosis) -> None:
+    assert "above those of the motion" in section_of(diagnosis, "time").lead
+    repeated = replace(diagnosis, noise_floor=dict.fromkeys(diagnosis.joint_names, 0.1))
+    assert "what changes between repetitions of a motion" in section_of(repeated, "time").lead
+    assert REPEATABILITY in section_of(repeated, "errors").blocks

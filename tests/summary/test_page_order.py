@@ -88,7 +88,7 @@ def test_the_worst_joint_and_the_size_are_on_top(diagnosis: Diagnosis) -> None:
     after = replace(diagnosis.after, relative_moving=shares)
     error, effects, _ = diagnosis_figures(replace(diagnosis, after=after))
     assert f"worst joint: {joints[1]} 7.00%" in error.remark
-    assert "viscous_friction on elbow: 2.00 ± 0.10 N·m·s/rad" in effects.remark
+    assert "viscous friction on elbow: 2.00 ± 0.10 N·m·s/rad" in effects.remark
 
 
 def test_the_robot_of_a_diagnosis_is_drawn_from_its_shapes(

@@ -91,7 +91,7 @@ def records(problem: Problem, result: Result) -> dict[str, Shown]:
         "motion 1: condition number": result.motions[0],
         "motion_1: 5 joints, 6 s": motions_of(result)[0],
         "elbow: 3 joints, 5 samples, 0.4 s, from log.h5": RUN,
-        "viscous_friction on elbow: ": found.effects[0],
+        "viscous friction on elbow: ": found.effects[0],
         "the next motion": following,
         "motion_1: no violation": inspections,
         "no violation; joint_position proved": inspections["motion_1"],

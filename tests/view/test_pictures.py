@@ -2,6 +2,7 @@ import io
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -112,3 +113,22 @@ def test_a_gif_of_the_whole_motion(problem: Problem, segment: Segment) -> None:
     assert told == sorted(told)
     assert told[-1] == 6
     assert shared == content
+
+
+def test_rays_are_sent_only_where_something_stands(
+    problem: Problem, segment: Segment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    look = replace(SMALL, capsules=True)
+    sent: list[float] = []
+    seen = Studio._seen
+
+    def counted(self: Studio, view: object, sight: Any, *middle: object) -> object:
+        sent.append(len(sight.directions) / (96 * 72))
+        return seen(self, view, sight, *middle)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Studio, "_seen", counted)
+    fast = _pixels(still_png(problem, segment, look, time=1.0))
+    assert 0.01 < sent[0] < 0.7
+    monkeypatch.setattr(Studio, "_near", lambda self, shown: np.ones(96 * 72, dtype=bool))
+    np.testing.assert_array_equal(fast, _pixels(still_png(problem, segment, look, time=1.0)))
+    assert 1.0 in sent
