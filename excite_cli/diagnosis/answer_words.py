@@ -5,9 +5,15 @@ parts of the effects (`error_parts`) add up to it.
 """
 
 from collections.abc import Sequence
-from math import inf, isnan
+from math import floor, inf, isnan, log10
 
-from excite_cli.diagnosis.records import OPEN_SETUP, Diagnosis, NamedEffect, mean_of_known
+from excite_cli.diagnosis.records import (
+    OPEN_SETUP,
+    Diagnosis,
+    FrictionLine,
+    NamedEffect,
+    mean_of_known,
+)
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.diagnosis.words import (
     counted,
@@ -25,6 +31,7 @@ FRICTION = "friction"
 INERTIAS = "inertias"
 _WORTH_SAYING = 0.05  # share of the fall
 _NEARLY_ALL = 0.995
+_STANDS = 1e-3  # rad/s; m/s
 _MOST = 3  # effects beside friction that get a clause of their own
 _PREFIXES = ((1e6, "M"), (1e3, "k"))
 
@@ -126,15 +133,24 @@ def _friction(rubbing: Sequence[NamedEffect], found: Diagnosis) -> str:
 
 
 def _most_friction(rubbing: Sequence[NamedEffect], found: Diagnosis) -> str:
-    """`, largest on joint_1 (48 N·m at 1 rad/s)`, by the line of the joint with most of it."""
+    """`, largest on joint_1 (48 N·m at 1 rad/s)`, by the line of the joint with most of it.
+
+    At 0.1, 0.01, … where no joint was faster, whose line beyond may be negative.
+    """
     joints = {joint for each in rubbing for joint in each.effect.joints}
     lines = [line for line in found.friction_lines if line.joint in joints]
     if not lines or len(rubbing) < 2:
         return ""
-    most = max(lines, key=lambda line: abs(line.viscous.value + line.coulomb.value))
-    speed = "1 m/s" if "/m" in most.viscous.unit else "1 rad/s"
-    size = short_number(most.viscous.value + most.coulomb.value, 2)
-    return f", largest on {most.joint} ({size} {most.coulomb.unit} at {speed})"
+    slowest = min((line.fastest for line in lines if not isnan(line.fastest)), default=1.0)
+    speed = min(1.0, 10.0 ** floor(log10(max(slowest, _STANDS))))
+
+    def friction(line: FrictionLine) -> float:
+        return speed * line.viscous.value + line.coulomb.value
+
+    most = max(lines, key=lambda line: abs(friction(line)))
+    unit = "m/s" if "/m" in most.viscous.unit else "rad/s"
+    size = short_number(friction(most), 2)
+    return f", largest on {most.joint} ({size} {most.coulomb.unit} at {speed:g} {unit})"
 
 
 def _place(named: NamedEffect, found: Diagnosis) -> str:

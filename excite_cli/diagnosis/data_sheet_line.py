@@ -96,4 +96,5 @@ def _line(joint: int, traced: SearchResult, final: FinalFit) -> FrictionLine | N
     )
     plain = {each.place for each in straight}
     curved = any(effect.place not in plain for effect in kinds)
-    return FrictionLine(robot.joint_names[joint], viscous, coulomb, curved)
+    fastest = max(float(np.abs(each.v[:, joint]).max(initial=0.0)) for each in traced.signals)
+    return FrictionLine(robot.joint_names[joint], viscous, coulomb, curved, fastest=fastest)

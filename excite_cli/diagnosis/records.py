@@ -121,7 +121,8 @@ class FrictionLine:
     The straight line f_v v + f_c sgn v nearest to all friction of the joint over the speeds in the
     training data; `curved` where that is more than the two terms themselves. `kinds` are those that
     were found on this joint alone; where these are several, `verdict`, `removes` and `parts` are of
-    all of them together, as of a `NamedEffect`.
+    all of them together, as of a `NamedEffect`. `fastest` [rad/s; m/s] of the training data: of
+    higher speeds the line says nothing. Files of older versions do not have it.
     """
 
     joint: str
@@ -132,6 +133,7 @@ class FrictionLine:
     verdict: HeldOutVerdict | None = None
     removes: dict[str, ErrorReduction] = field(default_factory=dict)
     parts: dict[str, float] = field(default_factory=dict)
+    fastest: float = nan
 
 
 @dataclass(frozen=True)

@@ -71,6 +71,22 @@ def test_friction_is_one_share_and_the_rest_is_told_by_place() -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("fastest", "words"), [(0.15, "5.5 N·m at 0.1 rad/s"), (3.0, "-17 N·m at 1 rad/s")]
+)
+def test_friction_is_told_at_a_speed_that_the_data_have(fastest: float, words: str) -> None:
+    """An arm that crept through its Stribeck curve: beyond, the line is negative."""
+    line = FrictionLine(
+        "elbow", Value(-25.0, 0.1, "N·m·s/rad"), Value(8.0, 0.1, "N·m"), curved=True
+    )
+    answer = found(
+        effect("coulomb_friction", "elbow", RUBS, everywhere(0.2)),
+        effect("viscous_friction", "elbow", RUBS, everywhere(0.1)),
+        friction_lines=(replace(line, fastest=fastest),),
+    )
+    assert f"largest on elbow ({words})" in answer_in_words(answer)
+
+
 def test_names_that_fit_as_well_are_to_be_told_apart_next() -> None:
     more, less = (
         effect("spring", joint, SPRING, everywhere(part))
