@@ -46,7 +46,6 @@ from excite_cli.identification.prior import as_wide_as_needed
 from excite_cli.identification.regression import width_of
 from excite_cli.robot.model import Array
 
-_FEWEST = 2  # passes before one that brings no less error is the last
 _PASSES = 5  # with four, the level of a cut torque was 1.1 % off
 _SETTLED = 1e-3  # change of the residual energy from pass to pass
 _BETTER = 0.02  # relative: passes that differ by less are as good as each other
@@ -108,8 +107,6 @@ def trace(
         if over() or (attempt > 0 and now.places == fit.places and now.close_to(fit)):
             return traced, bodies
         passes.append(_Pass(fit, left_out, _left_out(traced)))
-        if attempt >= _FEWEST and passes[-1].error > min(e.error for e in passes[:-1]) - _BETTER:
-            break
         fit = now
         if attempt < _PASSES - 1:
             levels = dict(cut for effect in fit.effects for cut in effect.cuts_at())

@@ -65,7 +65,7 @@ def with_everyday(traced: SearchResult, chosen: Sequence[int]) -> list[int]:
 def those_that_matter(traced: SearchResult, chosen: Sequence[int]) -> list[int]:
     """Without those of the textbook's that surely do not matter, or whose size cannot be.
 
-    An offset may have any size: of what is missing beside it (a spring), it makes up the mean.
+    An offset may have any size: of what is missing beside it, it makes up the mean.
     """
     judge, found = traced.judge, list(chosen)
     elsewhere = _Elsewhere(traced, found)
