@@ -135,22 +135,27 @@ def _friction(rubbing: Sequence[NamedEffect], found: Diagnosis) -> str:
 def _most_friction(rubbing: Sequence[NamedEffect], found: Diagnosis) -> str:
     """`, largest on joint_1 (48 N·m at 1 rad/s)`, by the line of the joint with most of it.
 
-    At 0.1, 0.01, … where no joint was faster, whose line beyond may be negative.
+    At a speed that it had: beyond the data the line may be negative.
     """
     joints = {joint for each in rubbing for joint in each.effect.joints}
     lines = [line for line in found.friction_lines if line.joint in joints]
     if not lines or len(rubbing) < 2:
         return ""
-    slowest = min((line.fastest for line in lines if not isnan(line.fastest)), default=1.0)
-    speed = min(1.0, 10.0 ** floor(log10(max(slowest, _STANDS))))
-
-    def friction(line: FrictionLine) -> float:
-        return speed * line.viscous.value + line.coulomb.value
-
-    most = max(lines, key=lambda line: abs(friction(line)))
+    most = max(lines, key=lambda line: abs(_at(_speed(line), line)))
+    speed = _speed(most)
     unit = "m/s" if "/m" in most.viscous.unit else "rad/s"
-    size = short_number(friction(most), 2)
+    size = short_number(_at(speed, most), 2)
     return f", largest on {most.joint} ({size} {most.coulomb.unit} at {speed:g} {unit})"
+
+
+def _at(speed: float, line: FrictionLine) -> float:
+    return speed * line.viscous.value + line.coulomb.value
+
+
+def _speed(line: FrictionLine) -> float:
+    """1 rad/s (m/s), or 0.1, 0.01, … where the joint was not half as fast."""
+    fastest = 1.0 if isnan(line.fastest) else max(2.0 * line.fastest, _STANDS)
+    return min(1.0, 10.0 ** floor(log10(fastest)))
 
 
 def _place(named: NamedEffect, found: Diagnosis) -> str:
