@@ -17,7 +17,7 @@ PATHS = sorted(NOTEBOOKS.glob("*.ipynb"))
 # Of each: what its cells print, and the files that it leaves.
 EXPECTED = {
     "1-from-a-log-to-names": (
-        r"coupled_friction.*joint_5, joint_6",
+        r"friction of coupled gears.*joint_5, joint_6",
         {"tx40.h5", "tx40.html", "tx40_found.yaml", "figures"},
     ),
     "2-plan-simulate-diagnose": (
