@@ -13,7 +13,7 @@ import numpy as np
 
 from excite_cli.checks.catalogue import setup_checks
 from excite_cli.checks.setup import Samples, Setup
-from excite_cli.checks.setup_check import Alternative, SetupCheck
+from excite_cli.checks.setup_check import CLEAR, Alternative, SetupCheck
 from excite_cli.checks.textbook_fit import FLOOR, TextbookFit, TextbookShares
 from excite_cli.checks.trust import is_trusted
 from excite_cli.config.spec import Spec
@@ -42,10 +42,10 @@ def beyond_limits(robot: Robot, samples: Samples, setup: Setup) -> Mask:
     return ~(within.any(axis=0) | ~np.isfinite(upper - lower))
 
 
-# What an alternative must gain in L; and in the logarithm of the share of some joint, which falls
-# to 0.7 of what it was (all a little better is what effects do), unless it is the bodies that are
-# bent less. Of what shows on all joints a third must gain, too.
-_CLEAR, _FALLS, _GAINS, _SHOWN = 0.5, 0.35, 0.2, 0.33
+# What an alternative must gain beside `CLEAR` in L: in the logarithm of the share of some joint,
+# which falls to 0.7 of what it was (all a little better is what effects do), unless it is the
+# bodies that are bent less. Of what shows on all joints a third must gain, too.
+_FALLS, _GAINS, _SHOWN = 0.35, 0.2, 0.33
 _AS_GOOD = 0.35  # of L: alternatives that differ by less are told together
 _ROUGH, _CANDIDATES = 100, 4  # samples by which many alternatives are ranked; how many are kept
 _FINE = 2e-3  # share below which no difference is made between values of one thing
@@ -120,8 +120,8 @@ class _Candidate:
         """Whether it explains far more than another set-up."""
         gain = _gain(self.explained, other)
         shown = not self.check.of_all or np.mean(gain[other.judged] > _GAINS) >= _SHOWN
-        falls = gain.max() > _FALLS or other.bent - self.explained.bent > _CLEAR
-        return bool(self.cost < other.loss - _CLEAR and falls and shown)
+        falls = gain.max() > _FALLS or other.bent - self.explained.bent > CLEAR
+        return bool(self.cost < other.loss - CLEAR and falls and shown)
 
 
 def mistakes(fit: TextbookFit, spec: Spec) -> list[SetUpMistake]:
@@ -144,7 +144,7 @@ def mistakes(fit: TextbookFit, spec: Spec) -> list[SetUpMistake]:
 def _total(fit: TextbookFit, steps: Sequence[SetUpMistake]) -> float:
     """L of what several steps leave, and what each of them must gain."""
     left = steps[-1].left_after if steps else fit(Setup.as_declared(fit.robot))
-    return left.loss + sum(_CLEAR + step.after.price for step in steps)
+    return left.loss + sum(CLEAR + step.after.price for step in steps)
 
 
 def _steps(

@@ -30,6 +30,9 @@ class Alternative:
     is_plain: bool = False
 
 
+CLEAR = 0.5  # of L: what any other set-up must gain
+
+
 def descended(
     fit: TextbookFit, setup: Setup, steps: Iterable[float], moved: Callable[[Setup, float], Setup]
 ) -> tuple[Setup, float]:

@@ -10,14 +10,13 @@ from dataclasses import replace
 import numpy as np
 
 from excite_cli.checks.setup import LAGS, Setup
-from excite_cli.checks.setup_check import Alternative, Settings, SetupCheck, descended
+from excite_cli.checks.setup_check import CLEAR, Alternative, Settings, SetupCheck, descended
 from excite_cli.checks.textbook_fit import TextbookFit, TextbookShares
 from excite_cli.config.spec import Spec
 
 _CLOCKS = (0.25, 0.5, 0.7, 0.85, 0.93, 1.07, 1.18, 1.4, 2.0, 4.0)
 _FINE_CLOCK = (0.05, 0.025, 0.012, 0.006)  # in log
 _FINE_LAG = (0.005, 0.0025, 0.00125)  # s
-_CLEAR = 0.5  # of L, as all that is set up wrongly must gain
 _SMALLEST = 0.02  # s: shorter is a delay of the drive, left to the diagnosis
 
 
@@ -85,7 +84,7 @@ class TorqueLag(SetupCheck):
         losses = {lag: beside(replace(found.setup, lag=lag)).loss for lag in map(float, LAGS)}
         nearest = replace(found.setup, lag=min(losses, key=losses.__getitem__))
         setup, loss = descended(beside, nearest, _FINE_LAG, moved)
-        if abs(setup.lag) >= _SMALLEST and loss < beside(replace(setup, lag=0.0)).loss - _CLEAR:
+        if abs(setup.lag) >= _SMALLEST and loss < beside(replace(setup, lag=0.0)).loss - CLEAR:
             yield Alternative(setup)
 
     def sentence(self, names: Sequence[str], before: Setup, after: Setup) -> str:
