@@ -23,7 +23,7 @@ the two are compared, X has directions b that follow that of the motion over som
 """
 
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -48,6 +48,7 @@ _FIRST = 0.3  # s_j to begin with
 _ROUNDING = 1e-13
 _STATES, _SEEN = 40, 1e-9  # states; share of the largest singular value from which one counts
 _RIDGE = 1e-9  # of a column of X, whose norm is 1
+_TRIMS = 3  # fits, each without the instants that the one before leaves most of
 
 
 @dataclass(frozen=True)
@@ -139,21 +140,45 @@ class TextbookFit:
         turned = [self.robot.with_gravity(axis) for axis in np.eye(3)]
         return np.stack([RigidBody(each, phi, q, rest, rest).load for each in turned], axis=-1)
 
+    def left(self, setup: Setup, found: TextbookShares) -> Array:
+        """Torque (T, n) that bodies and friction leave, those of these or of other samples."""
+        v, a, _, whole, bristles = self._rows(setup)
+        columns = self.columns(setup)
+        load, known = columns @ self.bodies(setup, found.z), columns @ self.phi
+        passive = [
+            _passive(v[:, j], a[:, j], known[:, j], bristles[:, j]) @ found.passive[j]
+            for j in range(len(found.shares))
+        ]
+        return np.asarray(whole - load - np.column_stack(passive))
+
     def missed(self, setup: Setup, found: TextbookShares) -> Array:
         """Shares (n,) of these torques that bodies and friction of other samples miss.
 
         `nan` where either has none that count.
         """
-        (v, a, torque, whole, bristles), counted = self._rows(setup), self.counted(setup)
-        columns = self.columns(setup)
-        load, known = columns @ self.bodies(setup, found.z), columns @ self.phi
-        shares = np.full(len(found.shares), np.nan)
+        counted, torque = self.counted(setup), setup.torque(self.samples)
+        left, shares = self.left(setup, found), np.full(len(found.shares), np.nan)
         for j in np.flatnonzero(found.judged & (counted.sum(axis=0) >= FEWEST)):
             at = counted[:, j]
-            passive = _passive(v[at, j], a[at, j], known[at, j], bristles[at, j])
-            left = whole[at, j] - load[at, j] - passive @ found.passive[j]
-            shares[j] = np.sqrt(np.mean(left**2)) / max(float(np.std(torque[at, j])), 1e-9)
+            rms = np.sqrt(np.mean(left[at, j] ** 2))
+            shares[j] = rms / max(float(np.std(torque[at, j])), 1e-9)
         return shares
+
+    def without_worst(self, setup: Setup, share: float) -> "TextbookFit":
+        """The same without the instants that fit worst, a share of all (least trimmed squares)."""
+        fit = self
+        for _ in range(_TRIMS):
+            found = fit(setup)
+            counted = self.counted(setup) & found.judged
+            torque = np.where(counted, setup.torque(self.samples), np.nan)
+            size = np.nan_to_num(np.nanvar(torque, axis=0), nan=1.0)
+            left = np.square(self.left(setup, found)) / np.maximum(size * found.shares**2, 1e-18)
+            wrong = np.where(counted, left, 0.0).sum(axis=1)
+            kept = wrong <= np.quantile(wrong, 1.0 - share)
+            samples = replace(self.samples, known=self.samples.known & kept[:, None])
+            fit = copy(self)
+            fit.samples = samples
+        return fit
 
     def _fitted(self, setup: Setup, columns: Array, phi: Array, basis: Array) -> TextbookShares:
         bodies = (phi, basis, self._scale, self._floor)

@@ -22,7 +22,7 @@ from excite_cli.diagnosis.words import (
     place_in_words,
     title_of,
 )
-from excite_cli.effects.catalogue import catalogue, straight_friction
+from excite_cli.effects.catalogue import catalogue, rubs
 from excite_cli.effects.parameter import Value
 from excite_cli.identification.fit_words import relative_in_words, short_number
 from excite_cli.identification.torque_scale import KNOWN_LOAD
@@ -32,6 +32,8 @@ INERTIAS = "inertias"
 _WORTH_SAYING = 0.05  # share of the fall
 _NEARLY_ALL = 0.995
 _STANDS = 1e-3  # rad/s; m/s
+# Of the torque, and times the textbook's error: a joint that loses less is as good as before.
+_LOST, _LOST_TIMES = 0.005, 1.1
 _MOST = 3  # effects beside friction that get a clause of their own
 _PREFIXES = ((1e6, "M"), (1e3, "k"))
 
@@ -60,10 +62,8 @@ def shares(found: Diagnosis) -> dict[str, float]:
 
 
 def _rubs(named: NamedEffect) -> bool:
-    """Whether it is friction: plain, or what refines or couples that."""
     kind = catalogue().get(named.effect.kind)
-    plain = {each.kind for each in straight_friction(0)}
-    return kind is not None and (kind.friction or bool(plain & set(kind.refines)))
+    return kind is not None and rubs(kind)
 
 
 def _missing(found: Diagnosis) -> str:
@@ -191,12 +191,32 @@ def _left(found: Diagnosis) -> list[str]:
     text = f"Held-out error {_percent(found)} of torque RMS (mean over joints, where they move)"
     if known[worst] > 1.5 * found.after.mean_relative_moving:
         text += f", largest on {worst} ({relative_in_words(known[worst])})"
-    said = [text + "."]
+    said = [text + ".", *_worse_than_the_textbook(found)]
     for each in found.unexplained[:1]:
         words = [covariate_in_words(covariate) for covariate in each.depends_on]
         listed = " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
         said.append(f"The residual of {each.joint} depends on {listed}.")
     return said
+
+
+def _worse_than_the_textbook(found: Diagnosis) -> list[str]:
+    """The joint that loses most by what was found: a mean hides it."""
+    if found.textbook is None:
+        return []
+    before, after = found.textbook.error.relative_moving, found.after.relative_moving
+    lost = {joint: after[joint] - before[joint] for joint in after if joint in before}
+    worse = {
+        joint: loss
+        for joint, loss in lost.items()
+        if loss > _LOST and after[joint] > _LOST_TIMES * before[joint]
+    }
+    if not worse:
+        return []
+    joint = max(worse, key=worse.__getitem__)
+    return [
+        f"On {joint} this model is worse than textbook friction "
+        f"({relative_in_words(after[joint])}, with that {relative_in_words(before[joint])})."
+    ]
 
 
 def _next(found: Diagnosis) -> str:

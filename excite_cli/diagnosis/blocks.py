@@ -95,21 +95,21 @@ class Blocks:
     ) -> dict[int, Array]:
         """As `energies`, of the model with one of `more` beside the chosen, of each of them."""
         fits = self._fits(tuple(sorted(chosen)))
-        ends = len(fits.at) + np.cumsum([0, *(len(self._own(i)) for i in more)])
-        at = np.concatenate([fits.at, *(self._own(i) for i in more)]).astype(np.intp)
+        ends = np.cumsum([0, *(len(self._own(i)) for i in more)])
+        beside = np.concatenate([fits.at[:0], *(self._own(i) for i in more)])
+        at = np.concatenate([fits.at, beside])
         found = np.zeros((len(self._rest), len(more), len(at)))
-        normal, rhs = self._rest[:, at[:, None], at], self._rest[:, at, -1]
+        shared = self._rest[:, fits.at[:, None], beside]
+        normal, rhs = self._rest[:, beside[:, None], beside], self._rest[:, beside, -1]
+        across = fits.inverses @ shared
+        left = normal - np.swapaxes(shared, 1, 2) @ across
+        left[:, np.arange(len(beside)), np.arange(len(beside))] += RIDGE
+        side = rhs - (fits.parameters[:, None] @ shared)[:, 0]
         base = slice(len(fits.at))
-        solved = fits.inverses @ normal[:, base, ends[0] :]
         for k, own in enumerate(slice(*pair) for pair in pairwise(ends)):
-            across = solved[:, :, own.start - ends[0] : own.stop - ends[0]]
-            shared = normal[:, own, base]
-            left = normal[:, own, own] - shared @ across
-            left[:, np.arange(len(left[0])), np.arange(len(left[0]))] += RIDGE
-            beside = rhs[:, own] - (shared @ fits.parameters[:, :, None])[:, :, 0]
-            sizes = np.linalg.solve(left, beside[:, :, None])
-            found[:, k, own] = sizes[:, :, 0]
-            found[:, k, base] = fits.parameters - (across @ sizes)[:, :, 0]
+            sizes = np.linalg.solve(left[:, own, own], side[:, own, None])
+            found[:, k, len(fits.at) :][:, own] = sizes[:, :, 0]
+            found[:, k, base] = fits.parameters - (across[:, :, own] @ sizes)[:, :, 0]
         return dict(zip(more, self._left(at, found, joints), strict=True))
 
     def fit(self, chosen: Sequence[int]) -> None:

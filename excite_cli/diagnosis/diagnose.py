@@ -17,6 +17,7 @@ from excite_cli.diagnosis.data_sheet_line import data_sheet_lines, with_worth
 from excite_cli.diagnosis.effect_trace import effect_traces
 from excite_cli.diagnosis.excess_residual import excess_residuals
 from excite_cli.diagnosis.final_fit import final_fit, regression, signal_to_error
+from excite_cli.diagnosis.held_out_difference import held_out_difference
 from excite_cli.diagnosis.held_out_errors import (
     INERTIAS,
     HeldOutRuns,
@@ -173,6 +174,9 @@ def diagnose(
     rank, declared = base.rank, len(model.declared)
     variances = np.diag(final.covariance)[:rank]
     assumed = assumptions(traced.effects, parts, model)
+    reached, usual = played.errors(told[1]), trained.errors(after)
+    both = reached.mean_relative_moving, usual.mean_relative_moving
+    names = {run.name for run in parts.training}
     return Diagnosis(
         config="",
         config_folder="",
@@ -184,7 +188,7 @@ def diagnose(
         absorbed=absorbed_effects(traced.judge.white, traced.candidates, traced.chosen, model),
         held_out_run=parts.held_out_name,
         before=played.errors(told[0]),
-        after=played.errors(told[1]),
+        after=reached,
         rounds=rounds_of(traced),
         findings=(
             *dataset.findings,
@@ -195,6 +199,7 @@ def diagnose(
             *_filter_bias(model, models[1], spec, parts.training, processing),
             *cut_short,
             *differences_between_runs(traced),
+            *held_out_difference(robot, models[1], kept, told[1], names, both),
             *not_seen(
                 effect_parameter_names((*model.declared, *traced.effects), robot.joint_names),
                 final.seen[base.rank :],
@@ -224,7 +229,7 @@ def diagnose(
         recorded=recorded(dataset),
         excess_residuals=rests,
         joint_aliases=_joint_aliases(traced, doubts),
-        trained=trained.errors(after),
+        trained=usual,
         inertia_names=standard_parameter_names(robot),
         inertia_parts=by_joint(robot.joint_names, taken_off[INERTIAS]) if from_urdf else {},
         friction_lines=with_worth(lines, held, traced, with_all, taken_off),

@@ -15,6 +15,7 @@ is the most that noise with a memory can be.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import compress
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -65,14 +66,17 @@ def band_noise(
     """Noise of the torque of `recorded` runs, of which `prepared` are the same in the same order.
 
     predicted: torque (T, n) of a model at the working rate of each run. Recordings below 50 Hz do
-    not show the noise, nor does torque that somebody low-passed.
+    not show the noise, nor does torque that somebody low-passed. Of several rates all recordings
+    are judged in the bands of the lowest one that shows it.
     """
     n = recorded[0].tau.shape[1]
-    bands = [band for band in _BANDS if band[1] <= _HIGHEST * processing.recorded_rate]
     white, coloured = np.full(n, np.nan), np.full(n, np.nan)
-    if len(bands) < _WHITE:
+    rates = [_HIGHEST * min(1.0 / run.step, processing.recorded_rate) for run in recorded]
+    fast = [rate >= _BANDS[_WHITE - 1][1] for rate in rates]
+    if not any(fast):
         return BandNoise(white, coloured)
-    tasks = zip(recorded, prepared, predicted, strict=True)
+    bands = [band for band in _BANDS if band[1] <= min(compress(rates, fast))]
+    tasks = compress(zip(recorded, prepared, predicted, strict=True), fast)
     runs = list(each(_of_run, (bands, processing.moving_speed), tasks))
     seconds, counted, energies = (
         np.sum([getattr(run, name) for run in runs], axis=0)
@@ -230,10 +234,12 @@ def _left(level: float, corner: float, processing: Processing) -> float:
 
 def _gain(prepared: Sequence[PreparedRun], processing: Processing, joint: int) -> float:
     """Σ w² of the averages of the fit over that of whole ones: samples left out mean more noise."""
-    run = prepared[0]
-    h = float(run.t[1] - run.t[0])
-    whole = average_rows(len(run.t), np.array([len(run.t) // 2]), h, processing.parallel_cutoff)
-    rows = [each.fit_averages[joint][each.usable[:, joint]] for each in prepared]
-    squares = np.concatenate([np.asarray(x.multiply(x).sum(axis=1)).ravel() for x in rows])
-    full = float(whole.multiply(whole).sum())
-    return max(1.0, float(squares.mean()) / full) if len(squares) else 1.0
+    ratios = []
+    for run in prepared:
+        middle, step = np.array([len(run.t) // 2]), float(run.t[1] - run.t[0])
+        whole = average_rows(len(run.t), middle, step, processing.parallel_cutoff)
+        rows = run.fit_averages[joint][run.usable[:, joint]]
+        squares = np.asarray(rows.multiply(rows).sum(axis=1)).ravel()
+        ratios.append(squares / float(whole.multiply(whole).sum()))
+    every = np.concatenate(ratios)
+    return max(1.0, float(every.mean())) if len(every) else 1.0

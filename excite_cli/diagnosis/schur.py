@@ -123,20 +123,40 @@ class Schur:
         diagonal: Array,
         cross: Array,
         identified_by_prior_only: Mask,
+        of_larger: "tuple[Schur, Array, Array] | None" = None,
     ) -> None:
         """`products` (k, p) are G_Sc and N⁻¹ G_Sc, `diagonal` and `cross` (p,) of Z and z.
 
         `identified_by_prior_only` (p,): columns that scales tell from the model, and data do not.
+        `of_larger`: the same of a model with one member more, whose products these are, and W_i,
+        P_ii⁻¹ W_i (w, p) of that member.
         """
         self._candidates, self.diagonal, self.cross = candidates, diagonal, cross
         self._shared, self._solved = products
-        self._told = identified_by_prior_only
+        self._told, self._of_larger = identified_by_prior_only, of_larger
+        self._left_of: dict[tuple[int, ...], Array] = {}  # blocks of candidates of one shape
 
     def block(self, rows: Indices, columns: Indices) -> Array:
         """What is left (r, c) of some candidates' columns, counted from the first candidate's."""
         e = self._candidates
+        if self._of_larger is not None:
+            larger, solved, more = self._of_larger
+            return np.asarray(larger.block(rows, columns) + solved[:, rows].T @ more[:, columns])
         own = e.total[np.ix_(rows + e.fixed, columns + e.fixed)]
         return np.asarray(own - self._shared[:, rows].T @ self._solved[:, columns])
+
+    def _left(self, alike: OneShape) -> Array:
+        """What is left (m, w, w) of candidates of one shape."""
+        at = alike.columns - self._candidates.fixed
+        if self._of_larger is not None:
+            larger, *both = self._of_larger
+            solved, more = (np.moveaxis(x[:, at], 0, 2) for x in both)
+            return np.asarray(larger._left(alike) + solved @ np.swapaxes(more, 1, 2))
+        key = tuple(alike.candidates)
+        if key not in self._left_of:
+            shared, solved = (np.moveaxis(x[:, at], 0, 2) for x in (self._shared, self._solved))
+            self._left_of[key] = alike.grams - shared @ np.swapaxes(solved, 1, 2)
+        return self._left_of[key]
 
     def without(self, own: slice, inverse: Array, values: Array) -> "Schur":
         """After projection off the model without its columns `own` (w,).
@@ -145,10 +165,11 @@ class Schur:
         """
         solved = self._solved[own]
         more = inverse @ solved
-        products = np.vstack([self._shared, -more]), np.vstack([self._solved, solved])
         diagonal = self.diagonal + np.einsum("wp,wp->p", solved, more)
         cross = self.cross + values @ more
-        return Schur(self._candidates, products, diagonal, cross, self._told)
+        products = self._shared, self._solved
+        both = (self, solved, more)
+        return Schur(self._candidates, products, diagonal, cross, self._told, both)
 
     def identified_by_prior_only(self, candidate: int) -> bool:
         """Whether scales alone tell a candidate of one column from the model."""
@@ -176,8 +197,7 @@ class Schur:
         found: dict[int, Gain] = {}
         for alike in self._candidates.of_one_shape(some):
             at = alike.columns - self._candidates.fixed
-            shared, solved = (np.moveaxis(x[:, at], 0, 2) for x in (self._shared, self._solved))
-            left = alike.grams - shared @ np.swapaxes(solved, 1, 2)
+            left = self._left(alike)
             told = self._told[at[:, :1]] & (at.shape[1] == 1)
             absorbed = np.where(told, SHARED, ABSORBED)
             gains = _gains(left, self.cross[at], alike.bases, absorbed)
@@ -189,8 +209,9 @@ class Schur:
         e = self._candidates
         i = np.array([e.blocks[k][0] for k in first]) - e.fixed
         j = np.array([e.blocks[k][0] for k in second]) - e.fixed
-        shared = np.einsum("kp,kp->p", self._shared[:, i], self._solved[:, j])
-        ii, jj, ij = self.diagonal[i], self.diagonal[j], e.total[e.fixed + i, e.fixed + j] - shared
+        several, where = np.unique(np.concatenate([i, j]), return_inverse=True)
+        left = self.block(several, several)[where[: len(i)], where[len(i) :]]
+        ii, jj, ij = self.diagonal[i], self.diagonal[j], left
         zi, zj = self.cross[i], self.cross[j]
         determinant = ii * jj - ij**2
         found = (zi**2 * jj - 2 * zi * zj * ij + zj**2 * ii) / np.maximum(determinant, 1e-300)

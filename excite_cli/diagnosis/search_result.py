@@ -56,25 +56,23 @@ class SearchResult:
         usual = self.usual.gram(self.model, [each.effect for each in own])
         return WeightedFit(self.data, own, usual, [at[i] for i in self.plain]), at
 
-    def fitted(
-        self, chosen: Sequence[int], held: Array | None = None, roughly: bool = False
-    ) -> Array:
+    def fitted(self, chosen: Sequence[int], held: Array | None = None) -> Array:
         """Parameters (k,) of the model with these of what was chosen, or the textbook's effects.
 
         Weighted least squares, as in `identify`; the first parameters are those that are `held`.
-        `roughly`: with the weights of the model with all that was chosen, a tenth of the time.
         """
         fit, at = self._least_squares
-        near = self._weights if roughly else None
-        return fit([at[i] for i in chosen], held, near)[0]
+        return fit([at[i] for i in chosen], held)[0]
+
+    def products(self) -> Array:
+        """Products (k + 1, k + 1) that the fit of all that was chosen, in ascending order, solves.
+
+        The torque's are the last.
+        """
+        fit, at = self._least_squares
+        return fit.products([at[i] for i in sorted(self.chosen)])
 
     def imagined(self) -> tuple[Array, Array]:
         """Rows A (m, k) and b (m,) of unit variance, A x = b, beside the data of what was found."""
         fit, at = self._least_squares
         return fit.imagined([at[i] for i in self.chosen])
-
-    @cached_property
-    def _weights(self) -> Array:
-        """What the model with all that was chosen leaves of every joint (n,) [N·m]."""
-        fit, at = self._least_squares
-        return fit([at[i] for i in self.chosen])[1]

@@ -119,6 +119,16 @@ class WeightedFit:
         squares = np.array([both[at] @ gram @ both[at] for at, gram in own])
         return np.maximum(np.sqrt(np.maximum(squares, 0.0) / freedom), self._floor)
 
+    def products(self, chosen: Sequence[int]) -> Array:
+        """Products (k + 1, k + 1), the torque's last, of all that a model's parameters minimise."""
+        weight, _, sigma = self._fitted(chosen, np.zeros(0), None)
+        found = self._prior + weight * self._imagined(chosen, np.zeros(0))
+        for (active, gram), each in zip(self._grams, sigma, strict=True):
+            there = np.append(active, self._evidence.torque)
+            found[np.ix_(there, there)] += gram / each**2
+        at = np.append(self._evidence.columns(chosen), self._evidence.torque)
+        return np.asarray(found[np.ix_(at, at)])
+
     def imagined(self, chosen: Sequence[int]) -> tuple[Array, Array]:
         """Rows A (m, k) and b (m,) of unit variance: A x = b of what is imagined for a model."""
         columns = self._evidence.columns(chosen)

@@ -126,6 +126,12 @@ def straight_friction(joint: int) -> tuple[Effect, ...]:
     return ViscousFriction((joint,)), CoulombFriction((joint,))
 
 
+def rubs(kind: type[Effect]) -> bool:
+    """Whether a kind is friction: plain, or what refines or couples that."""
+    plain = {each.kind for each in straight_friction(0)}
+    return kind.friction or bool(plain & set(kind.refines))
+
+
 def carried_body(joint: int, runs: tuple[str, ...] = ()) -> Effect:
     """A body on the link that `joint` moves, in these runs (empty: all), by its ten parameters."""
     return Payload((joint,), {}, runs)

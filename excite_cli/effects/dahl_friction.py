@@ -266,15 +266,16 @@ def _with_turning_points(q: Array, v: Array, step: float) -> tuple[Array, Array]
     """
     before, after = v[:-1], v[1:]
     turns = before * after < 0.0
+    # Shares of the change, no more than one: speeds of 1e-160 have no squares.
     change = np.where(turns, before - after, 1.0)
-    between = np.where(turns, q[:-1] + 0.5 * step * before**2 / change, 0.5 * (q[:-1] + q[1:]))
+    first, last = before / change, after / change
+    between = np.where(turns, q[:-1] + 0.5 * step * before * first, 0.5 * (q[:-1] + q[1:]))
     points = np.empty(2 * len(q) - 1)
     points[::2], points[1::2] = q, between
-    half = 0.5 * step * turns / change**2
     derivatives = [
         np.where(turns, 1.0, 0.5),
-        half * before * (before - 2.0 * after),
-        half * before**2,
+        0.5 * step * turns * first * (first - 2.0 * last),
+        0.5 * step * turns * first**2,
     ]
     return points, np.stack(derivatives, axis=1)
 

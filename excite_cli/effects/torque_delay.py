@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from excite_cli.arrays import Mask
 from excite_cli.effects.base import Abscissa, Cotangents, Effect, Parameter, Scope, Signals
 from excite_cli.effects.judgement import Seen
 from excite_cli.effects.mechanism import real
@@ -64,8 +65,22 @@ class TorqueDelay(Effect):
         return _MISSED * np.abs(values)
 
     def columns(self, signals: Signals) -> Array:
-        """−d(torque)/dt, (T, len(joints), 1)."""
-        return -signals.rate(signals.torque[:, list(self.joints)])[:, :, None]
+        """−d(torque)/dt, (T, len(joints), 1); zero where a joint turns back."""
+        rate = signals.rate(signals.torque[:, list(self.joints)])
+        return -np.where(self._turns(signals), 0.0, rate)[:, :, None]
+
+    def _turns(self, signals: Signals) -> Mask:
+        """Instants (T, joints) between two of which the speed changes sign.
+
+        Dry friction jumps there, and again and again where a joint stands. A jump has no rate: of a
+        UR3's wrists 5.3 % of the torque was left with it, 1.9 without any delay.
+        """
+        back = np.signbit(signals.v[:, list(self.joints)])
+        found = np.zeros(back.shape, bool)
+        changes = back[1:] != back[:-1]
+        found[1:] |= changes
+        found[:-1] |= changes
+        return found
 
     def in_c(self, values: Array, columns: Sequence[str]) -> str:
         """−δ d(torque_j)/dt."""
@@ -88,5 +103,6 @@ class TorqueDelay(Effect):
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """∂/∂torque = −(transpose of the rate) weight."""
         back = np.zeros_like(signals.torque)
-        back[:, list(self.joints)] = -signals.rate_back(weights[:, :, 0])
+        counted = np.where(self._turns(signals), 0.0, weights[:, :, 0])
+        back[:, list(self.joints)] = -signals.rate_back(counted)
         return Cotangents(torque=back)

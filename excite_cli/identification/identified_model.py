@@ -19,9 +19,9 @@ from excite_cli.identification.errors_of_torque import Errors, torque_errors
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.regression import (
     Series,
-    effect_columns,
     places_of,
     signals_of,
+    torque_of,
     with_effects,
 )
 from excite_cli.measurement.run_identity import RunId
@@ -64,11 +64,8 @@ class IdentifiedModel:
     def predicted(self, robot: Robot, run: PreparedRun | Series) -> Prediction:
         """What it says of the motion of a prepared run, or of a series of states."""
         signals = with_effects(signals_of(run, robot, self.phi), self.effects, self.values)
-        load = signals.body.load
-        if not self.effects:
-            return Prediction(load, load)
-        columns = effect_columns(self.effects, signals)
-        return Prediction(load, np.asarray(load + columns @ self.values))
+        defects = torque_of(self.effects, self.values, signals, lambda effect: effect.data_defect)
+        return Prediction(signals.body.load, signals.torque + defects)
 
     def pull_back(self, robot: Robot, series: Series, weights: Array) -> tuple[Array, Array, Array]:
         """Derivatives by q, v, a, each (T, n), of Σ weights ∘ τ; weights (T, n).

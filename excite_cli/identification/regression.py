@@ -1,6 +1,6 @@
 """The regression: torque and the columns that explain it, filtered and decimated alike."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -105,15 +105,24 @@ def with_effects(signals: Signals, effects: Sequence[Effect], values: Array) -> 
     """
     if not len(values):
         return signals
-    counts = [len(effect.parameters) for effect in effects]
-    in_robot = np.repeat([not effect.data_defect for effect in effects], counts)
-    carried = np.repeat([effect.carried for effect in effects], counts)
     load = signals.load
-    if carried.any():
-        load = load + effect_columns(effects, signals) @ np.where(carried, values, 0.0)
+    if any(effect.carried for effect in effects):
+        load = load + torque_of(effects, values, signals, lambda effect: effect.carried)
         signals = replace(signals, load=load, torque=load)
-    rest = effect_columns(effects, signals) @ np.where(in_robot & ~carried, values, 0.0)
+    rest = torque_of(effects, values, signals, lambda e: not (e.carried or e.data_defect))
     return replace(signals, torque=load + rest)
+
+
+def torque_of(
+    effects: Sequence[Effect], values: Array, signals: Signals, among: Callable[[Effect], bool]
+) -> Array:
+    """Torque (T, n) [N·m] of some of the effects, whose linear parameters are `values` (k,)."""
+    n = signals.q.shape[1]
+    total = np.zeros((len(signals.t), n))
+    for effect, at in zip(effects, places_of(effects, len(values)), strict=True):
+        if among(effect) and effect.active(signals.run):
+            total[:, list(effect.rows(n))] += effect.columns(signals) @ values[at]
+    return total
 
 
 def width_of(effects: Sequence[Effect]) -> int:

@@ -1,14 +1,16 @@
 """Parts of the error on held-out data: they add up, and what is refined joins first."""
 
-from itertools import combinations
+from itertools import combinations, pairwise, permutations
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.held_out_errors import INERTIAS, HeldOutErrors, error_parts
+from excite_cli.diagnosis.held_out_errors import INERTIAS, HeldOutErrors, _Fit, error_parts
+from excite_cli.diagnosis.weighted_fit import WeightedFit
 from excite_cli.robot.model import Array
+from tests.diagnosis.explicit_data import FIXED, PRIOR, random_candidates, random_data
 
 JOINTS = 2
 
@@ -17,8 +19,12 @@ class Errors(SimpleNamespace):
     """Errors of every set of those who join, made up."""
 
     def of(self, joined: tuple[int, ...]) -> Array:
-        assert list(joined) == sorted(joined)
         return self.table[joined]
+
+    def along(self, order: list[int]) -> Array:
+        assert sorted(order) == sorted(self.who)
+        sets = [tuple(sorted(order[:count])) for count in range(len(order) + 1)]
+        return np.array([self.of(each) for each in sets])
 
 
 def made_up(who: tuple[int, ...], seed: int = 0) -> Any:
@@ -64,20 +70,61 @@ def test_errors_are_those_of_the_fitted_columns() -> None:
     rows = rng.normal(size=(50, 3))  # columns of one declared parameter and two candidates
     tau = rng.normal(size=50)
     first, last = rng.normal(size=50), rng.normal(size=50)
-    fits = {(): [1.0, 0, 0], (0,): [0.5, 2.0, 0], (1,): [0.3, 0, -1.0], (0, 1): [0.1, 1.5, -0.8]}
-    lacks = [
-        told - rows @ np.array(fits[each])
-        for told, each in ((first, ()), (last, (0, 1)))
-    ]  # fmt: skip
+    fits = np.array([[1.0, 0, 0], [0.5, 2.0, 0], [0.1, 1.5, -0.8]])
+    lacks = [told - rows @ each for told, each in ((first, fits[0]), (last, fits[2]))]
     block = np.column_stack([rows, *lacks, tau])
-    fit: Any = SimpleNamespace(who=(0, 1), parameters=lambda joined: np.array(fits[joined]))
-    errors = HeldOutErrors(fit, [block.T @ block, None])
+    fit: Any = SimpleNamespace(
+        who=(0, 1), first=lambda: fits[0], last=lambda: fits[2], between=lambda order: fits[1:2]
+    )
+    errors = HeldOutErrors(fit, [block.T @ block, None]).along([0, 1])
 
     def relative(prediction: Array) -> float:
         return float(np.linalg.norm(tau - prediction) / np.linalg.norm(tau))
 
-    assert errors.of(())[0] == pytest.approx(relative(first))
-    assert errors.of((0, 1))[0] == pytest.approx(relative(last))
-    half = rows @ np.array(fits[(0,)]) + (lacks[0] + lacks[1]) / 2
-    assert errors.of((0,))[0] == pytest.approx(relative(half))
-    assert np.isnan(errors.of((0,))[1])
+    half = rows @ fits[1] + (lacks[0] + lacks[1]) / 2
+    assert errors[:, 0] == pytest.approx([relative(each) for each in (first, half, last)])
+    assert np.isnan(errors[:, 1]).all()
+
+
+def test_nobody_who_joins_is_one_error() -> None:
+    fit: Any = SimpleNamespace(
+        who=(), first=lambda: np.ones(1), last=lambda: np.ones(1), between=lambda order: None
+    )
+    assert HeldOutErrors(fit, [np.eye(4)]).along([]).shape == (1, 1)
+
+
+@pytest.mark.parametrize("kept", [0, 2])
+def test_models_on_the_way_are_those_that_are_fitted_with_the_weights_of_the_last(
+    kept: int,
+) -> None:
+    """Of all orders, with the URDF's inertias before their fit joins, and without."""
+    data, candidates = random_data(2, PRIOR), random_candidates(2)
+    fit = WeightedFit(data, candidates)
+    sigma = fit([0, 1, 3])[1]
+    urdf = np.array([0.3, -0.2])[:kept]
+    traced: Any = SimpleNamespace(
+        model=SimpleNamespace(by_urdf=urdf, declared=()),
+        chosen=(3, 0, 1),
+        candidates=[SimpleNamespace(effect=_Wide(each.width)) for each in candidates],
+        data=data,
+        products=lambda: fit.products([0, 1, 3]),
+    )
+    way = _Fit(traced, from_urdf=kept > 0)
+    ends = FIXED + np.cumsum([0, *(candidates[i].width for i in (0, 1, 3))])
+    places = dict(zip((0, 1, 3), (slice(*each) for each in pairwise(ends)), strict=True))
+    for order in permutations(way.who):
+        for count, found in enumerate(way.between(order), start=1):
+            joined = sorted(i for i in order[:count] if i != INERTIAS)
+            held = np.zeros(0) if not kept or INERTIAS in order[:count] else urdf
+            expected = np.zeros(ends[-1])
+            expected[np.r_[(slice(0, FIXED), *(places[i] for i in joined))]] = fit(
+                joined, held, sigma
+            )[0]
+            assert found == pytest.approx(expected, rel=1e-7, abs=1e-10)
+
+
+class _Wide(SimpleNamespace):
+    """An effect of some parameters."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__(parameters=(None,) * width)

@@ -82,3 +82,17 @@ def test_jumps_at_frequent_reversals_are_no_noise() -> None:
     alone = prepare(Run("run", t, q, noise), p)
     rms = np.sqrt(np.mean(alone.tau_fit[fit.usable[:, 0], 0] ** 2))
     assert found.white[0] == pytest.approx(rms, rel=0.3)
+
+
+def test_recordings_of_several_rates_are_judged_in_the_bands_that_they_share() -> None:
+    """Of one at 100 Hz bands above 40 Hz are no bands; one at 40 Hz shows no noise at all."""
+    p, runs, fits = processing(250.0), [], []
+    for rate in (250.0, 100.0, 40.0):
+        run = recorded(np.sqrt(rate / 250.0) * coloured(0.0, 3, rate), rate)  # of one density
+        runs.append(run)
+        fits.append(prepare(run, p))
+    found = band_noise(runs, fits, [5.0 * fit.q for fit in fits], p)
+    alone = band_noise(runs[:1], fits[:1], [5.0 * fits[0].q], p)
+    np.testing.assert_allclose(found.white, alone.white, rtol=0.2)
+    slow = band_noise(runs[2:], fits[2:], [5.0 * fits[2].q], p)
+    assert np.isnan(slow.white).all()
