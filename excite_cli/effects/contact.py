@@ -80,6 +80,12 @@ class Contact(Effect):
         best = sorted((each for each in found if each is not None), key=lambda each: -each[0])
         return [{"start": start, "end": end} for _, start, end in best if end - start > _SHORTEST]
 
+    def shapes_near(self, signals: Sequence[Signals]) -> list[dict]:
+        """Windows that are not too long to be a touch."""
+        longest = _LONGEST * max(float(s.t[-1] - s.t[0]) for s in signals)
+        near = super().shapes_near(signals)
+        return [each for each in near if each["end"] - each["start"] <= longest]
+
     def finer_steps(self, name: str, signals: Sequence[Signals]) -> Sequence[float]:
         """Parts of the window's length."""
         length = max(abs(self.shape["end"] - self.shape["start"]), 0.05)

@@ -19,6 +19,7 @@ from excite_cli.identification.errors_of_torque import Errors, torque_errors
 from excite_cli.identification.prepare import PreparedRun
 from excite_cli.identification.regression import (
     Series,
+    carried_by,
     places_of,
     signals_of,
     torque_of,
@@ -63,9 +64,10 @@ class IdentifiedModel:
 
     def predicted(self, robot: Robot, run: PreparedRun | Series) -> Prediction:
         """What it says of the motion of a prepared run, or of a series of states."""
-        signals = with_effects(signals_of(run, robot, self.phi), self.effects, self.values)
+        alone = signals_of(run, robot, self.phi)
+        signals = with_effects(alone, self.effects, self.values)
         defects = torque_of(self.effects, self.values, signals, lambda effect: effect.data_defect)
-        return Prediction(signals.body.load, signals.torque + defects)
+        return Prediction(alone.load, signals.torque + defects)
 
     def pull_back(self, robot: Robot, series: Series, weights: Array) -> tuple[Array, Array, Array]:
         """Derivatives by q, v, a, each (T, n), of Σ weights ∘ τ; weights (T, n).
@@ -93,12 +95,7 @@ class IdentifiedModel:
 
     def carried(self, robot: Robot, run: RunId | None = None) -> Array:
         """φ (10·n_bodies,) of the bodies among the effects."""
-        phi = np.zeros(len(self.phi))
-        for effect, values in self.by_effect:
-            if effect.carried and effect.active(run or RunId()):
-                first = 10 * (robot.model_joints[effect.joints[-1]] - 1)
-                phi[first : first + 10] += values
-        return phi
+        return carried_by(self.effects, self.values, robot, run or RunId())
 
 
 def errors_on(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from excite_cli.dynamics.base_parameters import BaseParameters
-from excite_cli.dynamics.regressor import standard_parameters
+from excite_cli.dynamics.regressor import PARAMETERS_PER_BODY, standard_parameters
 from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Effect, Signals
 from excite_cli.identification.covariance import RunRows
@@ -99,18 +99,31 @@ def seen_of(motion: PreparedRun | Series, body: RigidBody) -> Signals:
 
 
 def with_effects(signals: Signals, effects: Sequence[Effect], values: Array) -> Signals:
-    """The same, with the torque of `effects` of `values` in it; gears carry bodies among them, too.
+    """The same, with the torque of `effects` of `values` in it.
 
-    Defects of the measurement are left out: they do not change the torque that they act upon.
+    Bodies among them are part of the rigid body: gears carry them, and gravity from elsewhere draws
+    on them, too. Defects of the measurement are left out: they do not change the torque that they
+    act upon.
     """
     if not len(values):
         return signals
-    load = signals.load
-    if any(effect.carried for effect in effects):
-        load = load + torque_of(effects, values, signals, lambda effect: effect.carried)
-        signals = replace(signals, load=load, torque=load)
+    body = signals.body
+    carried = carried_by(effects, values, body.robot, signals.run)
+    if carried.any():
+        body = RigidBody(body.robot, body.phi + carried, signals.q, signals.v, signals.a)
+        signals = replace(signals, load=body.load, torque=body.load, body=body)
     rest = torque_of(effects, values, signals, lambda e: not (e.carried or e.data_defect))
-    return replace(signals, torque=load + rest)
+    return replace(signals, torque=signals.load + rest)
+
+
+def carried_by(effects: Sequence[Effect], values: Array, robot: Robot, run: RunId) -> Array:
+    """φ (10·n_bodies,) of the bodies among effects that are present in a run."""
+    phi = np.zeros(PARAMETERS_PER_BODY * robot.n_bodies)
+    for effect, at in zip(effects, places_of(effects, len(values)), strict=True):
+        if effect.carried and effect.active(run):
+            first = PARAMETERS_PER_BODY * (robot.model_joints[effect.joints[-1]] - 1)
+            phi[first : first + PARAMETERS_PER_BODY] += values[at]
+    return phi
 
 
 def torque_of(
