@@ -106,6 +106,11 @@ def findings_of(
     return (*motion, *doubts), is_open and spec.measurement.trust is not True
 
 
+def also_an_effect(finding: Finding) -> str:
+    """The kind of effect that says the same as a doubt of the set-up; empty if none does."""
+    return {each.kind: each.effect for each in setup_checks()}.get(finding.kind, "")
+
+
 def without_fault(found: Sequence[CheckResult]) -> Sequence[CheckResult]:
     """The same, if none of them is a fault.
 

@@ -37,6 +37,7 @@ class GravityDirection(SetupCheck):
 
     name = "direction of gravity"
     kind = "mount"
+    effect = "base_tilt"
 
     def alternatives(
         self, fit: TextbookFit, setup: Setup, explained: TextbookShares

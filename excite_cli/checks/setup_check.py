@@ -51,6 +51,7 @@ class SetupCheck(Check):
     kind: ClassVar[str]  # of its findings
     of_all: ClassVar[bool] = False  # whether what it is about shows on every joint
     is_physical: ClassVar[bool] = False  # whether it is no mistake, and so never a fault
+    effect: ClassVar[str] = ""  # kind of effect that says the same, of which a diagnosis decides
 
     def look(self, log: Log) -> Iterable[CheckResult]:
         """Nothing: `set_up_search` asks for its alternatives."""
@@ -76,7 +77,7 @@ class SetupCheck(Check):
 
     def has_effect(self, before: Setup, after: Setup) -> bool:
         """Whether an effect of the model says the same as this mistake."""
-        return self.is_physical
+        return self.is_physical or bool(self.effect)
 
     def trusted(self, names: Sequence[str], spec: Spec, joints: Sequence[int]) -> Settings:
         """What to write where the data are right as they are."""

@@ -64,6 +64,7 @@ class TorqueLag(SetupCheck):
 
     name = "delay of torques"
     kind = "torque_lag"
+    effect = "torque_delay"
     of_all = True
 
     def alternatives(
@@ -92,10 +93,6 @@ class TorqueLag(SetupCheck):
         late = after.lag - before.lag
         word = "behind" if late > 0 else "before"
         return f"torques are {1e3 * abs(late):.3g} ms {word} the positions"
-
-    def has_effect(self, before: Setup, after: Setup) -> bool:
-        """The delay of a drive is one."""
-        return True
 
     def settings(self, names: Sequence[str], spec: Spec, before: Setup, after: Setup) -> Settings:
         """By how much torques are late."""

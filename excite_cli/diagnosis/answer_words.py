@@ -4,10 +4,11 @@ Shares are of the fall of the error on held-out data, mean over the joints that 
 parts of the effects (`error_parts`) add up to it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import floor, inf, isnan, log10
 
 from excite_cli.diagnosis.records import (
+    HELD_OUT_DIFFERS,
     OPEN_SETUP,
     Diagnosis,
     FrictionLine,
@@ -22,7 +23,7 @@ from excite_cli.diagnosis.words import (
     place_in_words,
     title_of,
 )
-from excite_cli.effects.catalogue import catalogue, rubs
+from excite_cli.effects.catalogue import catalogue, rubs, straight_friction
 from excite_cli.effects.parameter import Value
 from excite_cli.identification.fit_words import relative_in_words, short_number
 from excite_cli.identification.torque_scale import KNOWN_LOAD
@@ -125,11 +126,22 @@ def _percent(found: Diagnosis) -> str:
 
 
 def _friction(rubbing: Sequence[NamedEffect], found: Diagnosis) -> str:
-    """`Friction`, or the one effect that it is."""
+    """`Friction`, with what of it is no straight line and sure; or the one effect that it is."""
     if len(rubbing) > 1:
-        return "Friction"
+        sure = [each for each in rubbing if each.verdict is HeldOutVerdict.CONFIRMED]
+        more = [title_of(kind) for kind in beside_straight(each.effect.kind for each in sure)]
+        if not more:
+            return "Friction"
+        listed = " and ".join([", ".join(more[:-1]), more[-1]] if len(more) > 1 else more)
+        return f"Friction, with {listed},"
     title = title_of(rubbing[0].effect.kind)
     return f"{title[:1].upper()}{title[1:]} of {_place(rubbing[0], found)} ({_first(rubbing[0])})"
+
+
+def beside_straight(kinds: Iterable[str]) -> list[str]:
+    """Kinds of friction that are no straight line over speed, each once."""
+    straight = {each.kind for each in straight_friction(0)}
+    return [kind for kind in dict.fromkeys(kinds) if kind not in straight]
 
 
 def _most_friction(rubbing: Sequence[NamedEffect], found: Diagnosis) -> str:
@@ -191,7 +203,10 @@ def _left(found: Diagnosis) -> list[str]:
     text = f"Held-out error {_percent(found)} of torque RMS (mean over joints, where they move)"
     if known[worst] > 1.5 * found.after.mean_relative_moving:
         text += f", largest on {worst} ({relative_in_words(known[worst])})"
-    said = [text + ".", *_worse_than_the_textbook(found)]
+    said = [text + "."]
+    if any(each.kind == HELD_OUT_DIFFERS for each in found.findings):
+        said.append("The held-out recording differs from the training ones (warning: how).")
+    said += _worse_than_the_textbook(found)
     for each in found.unexplained[:1]:
         words = [covariate_in_words(covariate) for covariate in each.depends_on]
         listed = " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

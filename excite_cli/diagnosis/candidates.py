@@ -286,7 +286,7 @@ def _of_run(
                 columns[i] = block.copy()
                 usual = [parameter.high for parameter in effects[i].parameters]
                 largest[i] = np.abs(block * usual).max(axis=(0, 1), initial=0.0)
-    signals.body.forget()
+    signals.forget()
     return columns, largest
 
 

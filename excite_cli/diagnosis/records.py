@@ -265,6 +265,7 @@ class Information:
 
 
 OPEN_SETUP = "open_setup"  # the kind of a finding: the set-up is in doubt
+HELD_OUT_DIFFERS = "held_out_differs"  # the kind of a finding: its error is far larger
 CUT_SHORT = "cut_short"  # the kind of a finding: the search did not come to its end
 _UNCHANGED = 0.02  # of an error that no effect concerns
 

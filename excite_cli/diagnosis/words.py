@@ -221,7 +221,7 @@ def _predicted(rest: ExcessResidual) -> str:
     share = f"{rest.predictable:.0%} of its variance is predictable"
     if rest.depends_on:
         best = " and ".join(each.code for each in rest.depends_on)
-        return f"{share}, best from {best}; no effect of the catalogue has this form"
+        return f"{share}, best from {best}; no effect that was tried has this form"
     if rest.predictable > _TELLING:
         return f"{share}, but not from one or two quantities"
     return "no tested quantity predicts the residual"

@@ -2,9 +2,10 @@
 
 With the base turned by small angles δ about the axes of the world, gravity in the model's frame
 becomes R(δ)ᵀ g ≈ g − δ × g, and the torque, linear in gravity, changes by G (−δ × g) with G the
-torque per unit of gravity along each axis. Turning about gravity itself changes nothing, so there
-are two angles: roll about x and pitch about y where gravity is along z. On a robot whose gravity
-lies along another axis, roll and pitch are about the other two, in the order x, y, z.
+torque per unit of gravity along each axis, of bodies that are carried as well. Turning about
+gravity itself changes nothing, so there are two angles: roll about x and pitch about y where
+gravity is along z. On a robot whose gravity lies along another axis, roll and pitch are about the
+other two, in the order x, y, z.
 """
 
 from collections.abc import Mapping, Sequence
@@ -52,7 +53,7 @@ class BaseTilt(Effect):
 
     def columns(self, signals: Signals) -> Array:
         """G (−axis × g) for both axes, (T, n, 2)."""
-        return signals.body.gravity_axes @ _changes(signals.body.robot).T
+        return signals.whole_body.gravity_axes @ _changes(signals.body.robot).T
 
     def in_c(self, values: Array, columns: Sequence[str]) -> str:
         """Gravity that is turned."""
@@ -68,13 +69,12 @@ class BaseTilt(Effect):
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """The derivative of gravity's torque by position, gravity being −axis × g."""
         back = np.zeros_like(signals.q)
-        still, robot = np.zeros_like(signals.q), signals.body.robot
+        still, body = np.zeros_like(signals.q), signals.whole_body
+        robot = body.robot
         for p, change in enumerate(_changes(robot)):
             model = robot.model.copy()
             model.gravity.linear = change
-            turned = RigidBody(
-                replace(robot, model=model), signals.body.phi, signals.q, still, still
-            )
+            turned = RigidBody(replace(robot, model=model), body.phi, signals.q, still, still)
             back += np.einsum("tr,trk->tk", weights[:, :, p], turned.by_position)
         return Cotangents(q=back)
 

@@ -24,6 +24,7 @@ class Signals:
     of the rigid-body torque. `start` is the campaign's time at t = 0 [s]. `covariates` (T,) by name
     are further columns of the log that effects may follow, in whatever unit they were recorded.
     `before` (L, n): positions of the same time step before the first, where they are known.
+    `laden`: `body` with bodies among the effects found, if there are any.
     """
 
     t: Array
@@ -37,6 +38,17 @@ class Signals:
     start: float = 0.0
     covariates: Mapping[str, Array] = field(default_factory=dict)
     before: Array | None = None
+    laden: RigidBody | None = None
+
+    @property
+    def whole_body(self) -> RigidBody:
+        """The rigid body with all that it carries."""
+        return self.body if self.laden is None else self.laden
+
+    def forget(self) -> None:
+        """Let go of what the rigid body can compute again."""
+        for body in (self.body, self.whole_body):
+            body.forget()
 
     @property
     def clock(self) -> Array:
@@ -52,7 +64,10 @@ class Signals:
         """Some of the instants; nothing is known of before."""
         series = {name: getattr(self, name)[at] for name in ("t", "q", "v", "a", "load", "torque")}
         others = {name: values[at] for name, values in self.covariates.items()}
-        return replace(self, **series, body=self.body.cut(at), covariates=others, before=None)
+        laden = None if self.laden is None else self.laden.cut(at)
+        return replace(
+            self, **series, body=self.body.cut(at), covariates=others, before=None, laden=laden
+        )
 
     def with_covariate(self, name: str) -> Signals:
         """The same with that column of the log alone."""

@@ -110,8 +110,8 @@ def with_effects(signals: Signals, effects: Sequence[Effect], values: Array) -> 
     body = signals.body
     carried = carried_by(effects, values, body.robot, signals.run)
     if carried.any():
-        body = RigidBody(body.robot, body.phi + carried, signals.q, signals.v, signals.a)
-        signals = replace(signals, load=body.load, torque=body.load, body=body)
+        laden = RigidBody(body.robot, body.phi + carried, signals.q, signals.v, signals.a)
+        signals = replace(signals, load=laden.load, torque=laden.load, laden=laden)
     rest = torque_of(effects, values, signals, lambda e: not (e.carried or e.data_defect))
     return replace(signals, torque=signals.load + rest)
 
@@ -222,7 +222,7 @@ def _columns(
     signals = with_effects(signals_of(prepared, robot, phi), effects, values)
     if inertial is None:
         inertial = prepared.averaged_for_fit(signals.body.regressor[:, :, selection])
-        signals.body.forget()
+        signals.forget()
     own = prepared.averaged_for_fit(effect_columns(effects, signals))
     return np.concatenate([inertial, own], axis=2)
 

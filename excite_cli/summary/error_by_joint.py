@@ -55,7 +55,8 @@ def _verdict(found: Diagnosis) -> str:
         + (f", {counted(len(found.approximations), 'surrogate term')}" * bool(found.approximations))
         + "; mean held-out error where joints move "
         f"{found.before.mean_relative_moving:.2%} → {found.after.mean_relative_moving:.2%}; over "
-        f"all samples {found.after.mean_relative:.2%} (its 95% interval {low:.2%} to {high:.2%}). "
+        f"all samples, standing joints among them, {found.after.mean_relative:.2%} (95% interval "
+        f"of this {low:.2%} to {high:.2%}). "
         f"{found.seconds:.1f} s."
     )
 

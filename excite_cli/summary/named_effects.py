@@ -1,13 +1,14 @@
 """What a diagnosis found: effects, what each is indistinguishable from, and what is absorbed."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import nan
+from types import MappingProxyType
 
 import numpy as np
 
 from excite_cli.arrays import Array
-from excite_cli.diagnosis.answer_words import FRICTION
+from excite_cli.diagnosis.answer_words import FRICTION, beside_straight
 from excite_cli.diagnosis.records import (
     Diagnosis,
     EffectRecord,
@@ -50,7 +51,8 @@ def friction_rows(found: Diagnosis) -> tuple[list[NamedEffect], set[tuple[str, s
     for line in found.friction_lines:
         if line.verdict is not None:
             record = EffectRecord(FRICTION, (line.joint,), {}, ())
-            sizes = {"Coulomb": line.coulomb, "viscous": line.viscous}
+            like = "-equivalent" if line.curved else ""
+            sizes = {f"Coulomb{like}": line.coulomb, f"viscous{like}": line.viscous}
             rows.append(
                 NamedEffect(
                     record,
@@ -146,7 +148,8 @@ def effect_parts(found: Diagnosis, detail: Detail) -> Parts:
     alone = detail == Detail.PAGE and not shown
     if detail == Detail.VERBOSE or alone or len(small) < 2:  # a line about one is as long
         shown, small = [*shown, *small], []
-    parts: Parts = [effect_table(shown, everything, detail)] if shown else []
+    kinds = {line.joint: line.kinds for line in found.friction_lines}
+    parts: Parts = [effect_table(shown, everything, detail, kinds=kinds)] if shown else []
     title = f"{len(small)} small effects (each below {SMALL_PART:.0%} of the error reduction)"
     if small and detail:
         parts.append(replace(effect_table(small, everything, detail), title=title, folded=True))
@@ -178,15 +181,22 @@ def _is_part(named: NamedEffect, own: set[tuple[str, str]]) -> bool:
 
 
 def effect_table(
-    shown: Sequence[NamedEffect], everything: int, detail: Detail, title: str = _LACKING
+    shown: Sequence[NamedEffect],
+    everything: int,
+    detail: Detail,
+    title: str = _LACKING,
+    kinds: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> Table:
     """Effects with their sizes and evidence; `everything`: how many joints the robot has.
 
-    Of what is only approximated, also what it may be.
+    Of what is only approximated, also what it may be. `kinds` of friction on each joint.
     """
     rows = []
     for named in shown:
-        sizes = (value_in_words(name, value) for name, value in named.parameters.items())
+        sizes = [value_in_words(name, value) for name, value in named.parameters.items()]
+        if named.effect.kind == FRICTION:
+            more = beside_straight(kinds[named.effect.joints[0]])
+            sizes += [f"with {title_of(kind)}" for kind in more]
         row = {
             "effect": title_of(named.effect.kind),
             "where": place_in_words(named.effect, everything),

@@ -9,10 +9,12 @@ import pytest
 from excite_cli.diagnosis.answer_words import answer_in_words, shares
 from excite_cli.diagnosis.covariate import Covariate
 from excite_cli.diagnosis.records import (
+    HELD_OUT_DIFFERS,
     Diagnosis,
     EffectRecord,
     FrictionLine,
     NamedEffect,
+    Textbook,
 )
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.effects.base import Value
@@ -64,7 +66,8 @@ def test_friction_is_one_share_and_the_rest_is_told_by_place() -> None:
     assert shares(answer) == pytest.approx({"friction": 0.75, "spring": 0.25, "armature": 0.0})
     fall = 0.5 - answer.after.mean_relative_moving
     assert answer_in_words(answer) == (
-        "Friction accounts for 75% of the error reduction, largest on elbow (48 N·m at 1 rad/s). "
+        "Friction, with friction of coupled gears, accounts for 75% of the error reduction, "
+        "largest on elbow (48 N·m at 1 rad/s). "
         f"On shoulder_pitch: spring at the joint (6.9 kN·m/rad, {0.1 / fall:.0%} of the "
         "error reduction). Held-out error 3.6% of torque RMS (mean over joints, where they "
         "move), largest on slide (10%)."
@@ -184,3 +187,21 @@ def test_what_rests_on_a_weight_is_told_whatever_the_error_does() -> None:
     told = answer_in_words(found(first, spring))
     assert " Next: a motion that distinguishes spring at the joint of elbow from offset" in told
     assert "given the known mass. On elbow: spring at the joint (6.9 kN·m/rad" in told
+
+
+def test_a_joint_that_is_worse_than_with_textbook_friction_is_named() -> None:
+    """A mean hides it; what differs by little, or of little, is none."""
+    answer = found(effect("spring", "shoulder_pitch", SPRING, everywhere(0.1)))
+    after = answer.after.relative_moving
+    joint = next(name for name, each in after.items() if each > 0.01)
+    usual = replace(answer.after, relative_moving={**after, joint: 0.5 * after[joint]})
+    worse = answer_in_words(replace(answer, textbook=Textbook((), usual)))
+    assert f"On {joint} this model is worse than textbook friction (" in worse
+    close = replace(answer.after, relative_moving={**after, joint: 0.95 * after[joint]})
+    assert "worse than" not in answer_in_words(replace(answer, textbook=Textbook((), close)))
+
+
+def test_a_held_out_recording_that_differs_is_said_beside_its_error() -> None:
+    answer = found(effect("spring", "shoulder_pitch", SPRING, everywhere(0.1)))
+    told = replace(answer, findings=(Finding(HELD_OUT_DIFFERS, "warning", "r2 differs …"),))
+    assert "differs from the training ones (warning: how)." in answer_in_words(told)

@@ -179,6 +179,15 @@ def test_a_joint_held_in_one_run_is_masked_there() -> None:
     assert runs[1].usable().all(axis=0).tolist() == [True, True, False]
 
 
+def test_a_joint_that_stands_beside_the_noise_of_its_speed_has_no_dead_encoder() -> None:
+    run = with_column(recorded(), "q", 2, 0.25)
+    noise = np.random.default_rng(0).normal(0.0, 0.006, len(run.t))
+    _, findings = check(with_column(run, "dq", 2, noise))
+    found = only(findings, "held")
+    assert (found.severity, found.joints) == ("warning", ("wrist",))
+    assert "wrist stands at 0.25 in all runs" in found.text
+
+
 def test_dead_speed_is_not_used() -> None:
     (back,), findings = check(times(dq=[1, 0, 1])(recorded()))
     assert "elbow is constant" in only(findings, "dead_speed").text
