@@ -145,15 +145,15 @@ class _Motion:
             return cls(nothing, Flights(nothing, 1.0), 1, zero, zero)
         step = float(signals.t[1] - signals.t[0])
         finer = max(1, int(np.ceil(step / _FINE)))
-        inertia = np.maximum(signals.whole_body.mass[:, j, j], 1e-12)
+        inertia = np.maximum(signals.body.mass[:, j, j], 1e-12)
         at, samples = np.arange((len(load) - 1) * finer + 1) / finer, np.arange(len(load))
         fine = np.interp(at, samples, load)
         return cls(
             fine,
             Flights(fine / np.interp(at, samples, inertia), step / finer),
             finer,
-            signals.whole_body.mass[:, :, j] / inertia[:, None],
-            signals.whole_body.by_position[:, :, j],
+            signals.body.mass[:, :, j] / inertia[:, None],
+            signals.body.by_position[:, :, j],
         )
 
     def columns(self, gaps: Array) -> Array:

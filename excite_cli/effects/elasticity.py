@@ -66,7 +66,7 @@ class Elasticity(Effect):
 
     def columns(self, signals: Signals) -> Array:
         """−(∂τ/∂q_j τ_j + ∂τ/∂v_j dτ_j/dt + ∂τ/∂a_j d²τ_j/dt²), (T, n, 1)."""
-        j, body = self.joints[0], signals.whole_body
+        j, body = self.joints[0], signals.body
         parts = (body.by_position, body.by_velocity, body.mass)
         twists = self._twist(signals)[:, :, None, None]
         return -sum(part[:, :, [j]] * twist for part, twist in zip(parts, twists, strict=True))
@@ -79,7 +79,7 @@ class Elasticity(Effect):
 
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """Through τ_j and its rates, and through the derivatives (`slope_of_gradient`)."""
-        j, body, w = self.joints[0], signals.whole_body, -weights[:, :, 0]
+        j, body, w = self.joints[0], signals.body, -weights[:, :, 0]
         d_q, d_v, d_a = (signals.only(j, x) for x in self._twist(signals))
         gq, gv, ga = slope_of_gradient(body, w, d_q, d_v, d_a)
         by_q, by_v, by_a = (

@@ -45,7 +45,7 @@ class EncoderOffset(Effect):
 
     def columns(self, signals: Signals) -> Array:
         """∂τ/∂q_j, (T, n, 1)."""
-        return signals.whole_body.by_position[:, :, list(self.joints)]
+        return signals.body.by_position[:, :, list(self.joints)]
 
     def in_c(self, values: Array, columns: Sequence[str]) -> str:
         """x ∂τ/∂q_j."""
@@ -54,5 +54,5 @@ class EncoderOffset(Effect):
     def pull_back(self, signals: Signals, weights: Array) -> Cotangents:
         """Second derivatives of the torque along q_j (`slope_of_gradient`)."""
         along = signals.only(self.joints[0], np.ones(len(signals.t)))
-        gq, gv, ga = slope_of_gradient(signals.whole_body, weights[:, :, 0], along)
+        gq, gv, ga = slope_of_gradient(signals.body, weights[:, :, 0], along)
         return Cotangents(q=gq, v=gv, a=ga)

@@ -1,4 +1,4 @@
-"""Torque that is recorded late: τ_measured(t) = τ(t − δ) ≈ τ − δ dτ/dt.
+"""Torque that is recorded late: τ_measured(t) = τ(t − δ) ≈ τ − δ dτ/dt, but for jumps.
 
 One delay for all joints of the effect, of all terms of the torque: a lag of friction alone is not
 a delay. It is looked for on all joints together, on those of an arm, and on single ones.
@@ -25,7 +25,7 @@ _SHORTEST = 3e-4  # s
 
 
 class TorqueDelay(Effect):
-    """Row j of every joint named: −δ d(torque_j)/dt with one δ."""
+    """Row j of every joint named: −δ d(torque_j)/dt with one δ, zero where joint j turns back."""
 
     kind: ClassVar = "torque_delay"
     over_time: ClassVar = True
@@ -83,7 +83,7 @@ class TorqueDelay(Effect):
         return found
 
     def in_c(self, values: Array, columns: Sequence[str]) -> str:
-        """−δ d(torque_j)/dt."""
+        """−δ d(torque_j)/dt; its rate is zero where the joint turns back."""
         late = real(-float(values[0]))
         return " ".join(f"tau[{j}] += {late} * torque_rate[{j}];" for j in self.joints)
 

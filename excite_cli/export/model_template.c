@@ -346,7 +346,7 @@ static inline void tilted(real roll, real pitch, const real *q, real *out)
             for (int k = 0; k < 3; ++k)
                 change[k] += turned[k];
         }
-    rigid(BODY, change, q, STILL, STILL, out);
+    rigid(LOADED, change, q, STILL, STILL, out);
 }
 
 /* J' f of a force in the world's axes at the frame of the last joint. */
@@ -614,6 +614,9 @@ int excite_torque(
     robot_torque(&ahead, q, v, a, column, load, rate, bend, torque);
     if (RATES)
         backward(&ahead, torque, ahead.torque, rate, bend);
+    for (int j = 0; j < N; ++j)
+        if (!signbit(v[j]) != !signbit(ahead.last_v[j])) /* a jump has no rate */
+            rate[j] = 0;
     measured_torque(q, v, column, load, torque, rate, tau);
     const int sound = all_finite(N, load) && all_finite(N, torque) && all_finite(N, tau);
     return answer(N, kept(memory, &ahead, sound), tau);
@@ -635,6 +638,14 @@ static void rates(size_t count, real step, const real *x, real *out)
             out[k * N + j] = count < 3 ? 0
                 : (x[after * N + j] - x[before * N + j]) / ((real)(after - before) * step);
     }
+}
+
+/* Dry friction jumps where a joint turns back: a jump has no rate. */
+static void no_jumps(size_t count, const real *v, real *rate)
+{
+    for (size_t i = N; i < count * N; ++i)
+        if (!signbit(v[i]) != !signbit(v[i - N]))
+            rate[i] = rate[i - N] = 0;
 }
 
 /* Numbers that excite_series needs to work with. */
@@ -663,8 +674,10 @@ static void part(
     }
     (void)spare;
 @SERIES_EFFECTS@
-    if (RATES)
+    if (RATES) {
         rates(count, step, torque, rate);
+        no_jumps(count, v, rate);
+    }
     for (size_t k = 0; k < count; ++k)
         measured_torque(
             q + k * N, v + k * N, column ? column + k * EXCITE_COLUMNS : 0, load + k * N,
