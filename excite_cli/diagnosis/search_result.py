@@ -45,10 +45,27 @@ class SearchResult:
         """The effects that were found."""
         return tuple(self.candidates[i].effect for i in self.chosen)
 
+    @property
+    def members(self) -> list[int]:
+        """What models may have: what was chosen, parts of it, and the textbook's effects."""
+        parts = (k for i in self.chosen for k in self.parts_of(i))
+        return sorted({*self.chosen, *everyday(self.candidates), *parts})
+
+    def parts_of(self, i: int) -> list[int]:
+        """Candidates in the place of one that are a part of it, with fewer parameters."""
+        own = self.candidates[i]
+        return [
+            k
+            for k, each in enumerate(self.candidates)
+            if each.effect.kind in own.effect.same_as
+            and each.place[1:] == own.place[1:]
+            and each.width < own.width
+        ]
+
     @cached_property
     def _least_squares(self) -> tuple[WeightedFit, dict[int, int]]:
         """Of what was chosen and of the textbook's effects, and where each of them is in it."""
-        members = sorted({*self.chosen, *everyday(self.candidates)})
+        members = self.members
         own = [self.candidates[i] for i in members]
         at = {i: k for k, i in enumerate(members)}
         if not self.plain:

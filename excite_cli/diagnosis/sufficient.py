@@ -1,10 +1,11 @@
 """What was found, or the textbook's model: the answer.
 
 What the search named leaves, where it acts on several joints and is missed on one of them at most,
-unless the model with all of that predicts new recordings better (`comparison`). Of this, with the
-friction and rotors of the textbook beside it, and the textbook's model the one with fewer
-parameters is the answer, unless the other predicts better: by 2 % of the error, what was found;
-surely, the textbook's model, which claims nothing.
+unless the model with all of that predicts new recordings better (`comparison`). Where one of the
+kinds that make up an effect predicts as well, it takes its place. Of this, with the friction and
+rotors of the textbook beside it, and the textbook's model the one with fewer parameters is the
+answer, unless the other predicts better: by 2 % of the error, what was found; surely, the
+textbook's model, which claims nothing.
 
 What single runs carry describes these recordings, and no new one is the better predicted for it
 (pushes, and a load of two runs in three, were left out of the answer so). It stays if seconds
@@ -133,17 +134,17 @@ def _otherwise(gram: Array, across: Array, own: Array, size: Array) -> Array:
 
 def comparison_of(traced: SearchResult) -> ModelComparison:
     """Of models of what was found and of the textbook's effects."""
-    members = {*traced.chosen, *everyday(traced.candidates)}
-    return ModelComparison(traced.data, traced.candidates, members, traced.levels)
+    return ModelComparison(traced.data, traced.candidates, traced.members, traced.levels)
 
 
 def sufficient(traced: SearchResult, models: ModelComparison) -> list[int]:
     """The candidates found, with what every robot has, or the textbook's."""
-    several = _seen_on_several(traced, models)
+    chosen = _by_parts(traced, models)
+    several = _seen_on_several(traced, models, chosen)
     single = _of_single_runs(traced, models, several)
     plain = [*traced.plain, *single]
     kept = [i for i in several if i in single or not traced.candidates[i].effect.runs]
-    every, found = (with_everyday(traced, some) for some in (traced.chosen, kept))
+    every, found = (with_everyday(traced, some) for some in (chosen, kept))
     if models.difference(found, every).better:
         found = every
     best, larger = sorted(
@@ -156,9 +157,11 @@ def sufficient(traced: SearchResult, models: ModelComparison) -> list[int]:
     return those_that_matter(traced, best)
 
 
-def _seen_on_several(traced: SearchResult, models: ModelComparison) -> list[int]:
+def _seen_on_several(
+    traced: SearchResult, models: ModelComparison, chosen: Sequence[int]
+) -> list[int]:
     """What was found, but for what acts on several joints and is missed on one of them at most."""
-    judge, found = traced.judge, list(traced.chosen)
+    judge, found = traced.judge, list(chosen)
     while True:
         doubtful = {
             i: judge.white.gain_of(i, found).chi2
@@ -170,6 +173,23 @@ def _seen_on_several(traced: SearchResult, models: ModelComparison) -> list[int]
         if not doubtful:
             return found
         found = judge.without(min(doubtful, key=doubtful.__getitem__), found)
+
+
+def _by_parts(traced: SearchResult, models: ModelComparison) -> list[int]:
+    """What was found, with one part in place of an effect where that predicts as well.
+
+    Losses of a gear that are the same both ways are friction by load.
+    """
+    judge, found = traced.judge, list(traced.chosen)
+    for i in traced.chosen:
+        for k in traced.parts_of(i):
+            fewer = [k if each == i else each for each in found]
+            if k in found or not judge.allowed(judge.plain.solve(fewer), fewer, [k]):
+                continue
+            if models.difference(fewer, found).of_error <= np.log(rules.AS_GOOD):
+                found = fewer
+                break
+    return found
 
 
 def _of_single_runs(

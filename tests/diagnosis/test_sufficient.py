@@ -85,6 +85,7 @@ def test_what_single_runs_carry_stays_beside_the_textbook_if_its_own_seconds_mis
     traced: Any = SimpleNamespace(
         plain=(2,),
         chosen=(0, 1),
+        parts_of=lambda i: [],
         judge=judge,
         candidates=[SimpleNamespace(effect=each, rows=(0,), width=1) for each in effects],
     )
@@ -107,6 +108,7 @@ def test_of_models_that_differ_by_less_than_two_per_cent(
     traced: Any = SimpleNamespace(
         plain=both if plain_is_larger else one,
         chosen=one if plain_is_larger else both,
+        parts_of=lambda i: [],
         judge=None,
         candidates=[SimpleNamespace(effect=each, rows=(0,), width=1) for each in effects],
     )
@@ -116,6 +118,41 @@ def test_of_models_that_differ_by_less_than_two_per_cent(
 
     models: Any = SimpleNamespace(difference=difference, missed=None)
     assert sufficient_.sufficient(traced, models) == answer
+
+
+@pytest.mark.parametrize(
+    ("gained", "possible", "answer"),
+    [(0.001, True, [2, 1]), (0.05, True, [0, 1]), (0.001, False, [0, 1])],
+)
+def test_a_part_of_an_effect_takes_its_place_where_it_predicts_as_well(
+    gained: float, possible: bool, answer: list[int]
+) -> None:
+    """Losses of a gear that are the same both ways are friction by load, if that can be so."""
+    judge: Any = SimpleNamespace(
+        plain=SimpleNamespace(solve=lambda some: np.zeros(0)),
+        allowed=lambda parameters, some, added: possible,
+    )
+    names = ("gear_loss", "coulomb_friction", "load_dependent_friction")
+    effects = [kind(name) for name in names]
+    traced: Any = SimpleNamespace(
+        plain=(1,),
+        chosen=(0, 1),
+        judge=judge,
+        candidates=[
+            SimpleNamespace(effect=each, rows=(0,), width=len(each.parameters), place=each.place)
+            for each in effects
+        ],
+    )
+    traced.parts_of = lambda i: SearchResult.parts_of(traced, i)
+    assert traced.parts_of(0) == [2]
+    assert traced.parts_of(1) == []
+
+    def difference(one: list[int], other: list[int]) -> SimpleNamespace:
+        return SimpleNamespace(better=len(other) > len(one), of_error=gained)
+
+    models: Any = SimpleNamespace(difference=difference, missed=None)
+    found = sufficient_._by_parts(traced, models)
+    assert found == answer
 
 
 def test_an_offset_may_have_any_size() -> None:
