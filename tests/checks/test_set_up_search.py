@@ -20,7 +20,7 @@ from excite_cli.config.load_spec import load_spec, spec_of
 from excite_cli.config.spec import Spec
 from excite_cli.dynamics.regressor import InverseDynamics
 from excite_cli.effects.catalogue import kind_named
-from excite_cli.identification.prepare import prepare_all
+from excite_cli.identification.prepare import PreparedRun, prepare_all
 from excite_cli.identification.processing import choose_processing
 from excite_cli.measurement.dataset import Dataset, Run
 from excite_cli.robot.model import Array, Robot
@@ -212,6 +212,28 @@ def test_a_run_that_shows_a_wrong_order_more_is_not_foreign(sound: Dataset) -> N
     prepared = prepare_all(data.runs, choose_processing(data.runs, SPEC.measurement.filter))
     assert foreign_runs(ROBOT, prepared)
     assert {each.kind for each in found(data)} == {"order"}
+
+
+def test_a_push_makes_no_other_robot_and_another_robots_torques_do(sound: Dataset) -> None:
+    """Of a recording that does not fit for a tenth of its time, and of one that never does."""
+    (first,) = sound.runs
+    size, t = first.tau.std(axis=0), first.t - first.t[0]
+
+    def other(tau: Array) -> list[PreparedRun]:
+        runs = (first, replace(first, name="other", tau=tau))
+        return prepare_all(runs, choose_processing(runs, SPEC.measurement.filter))
+
+    pushed = (t > 0.3 * t[-1]) & (t < 0.4 * t[-1])
+    push = other(first.tau + 5.0 * size * pushed[:, None])
+    strange = other(first.tau[::-1].copy())
+    setup = Setup.as_declared(ROBOT)
+    shares = [
+        TextbookFit(ROBOT, samples_of(run, 300))(setup).left for run in (push[1:], strange[1:])
+    ]
+    assert min(shares) > 0.4  # neither fits as a whole
+    assert foreign_runs(ROBOT, push) == []
+    (told,) = foreign_runs(ROBOT, strange)
+    assert (told.runs, told.is_open) == ("other", True)
 
 
 def test_bodies_of_no_mass_are_unlikely(sound: Dataset) -> None:

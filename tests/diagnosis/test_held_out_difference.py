@@ -28,17 +28,21 @@ PHI = standard_parameters(ROBOT)
 def said(
     errors: float = 0.01, seeds: tuple[int, int] = (5, 6), push: float = 0.0, **other: Any
 ) -> str:
-    """Of a recording r2 that is not as the model has it; r1 is fitted. `push` [N·m] for 1.5 s."""
-    truth = {"robot": ROBOT, "phi": PHI, "values": VALUES, "effects": EFFECTS, **other}
+    """Of a recording r2 that is not as the model has it; r1 is fitted. `push` [N·m] for 1.5 s.
+
+    `mounted`: the robot as the model has it, too.
+    """
+    robot = other.pop("mounted", ROBOT)
+    truth = {"robot": robot, "phi": PHI, "values": VALUES, "effects": EFFECTS, **other}
     dataset = measured(noise=0.02, seconds=20.0, seeds=seeds, **truth)
     one, other_ = dataset.runs
     pushed = push * ((other_.t > 8.0) & (other_.t < 9.5))
     recorded = (one, replace(other_, tau=other_.tau + pushed[:, None]))
     trained, run = (prepare(r, choose_processing(recorded, FilterSpec())) for r in recorded)
     model = IdentifiedModel(PHI, EFFECTS, VALUES)
-    predicted = [model.predicted(ROBOT, run)]
-    now = errors_on(ROBOT, [run], predicted).mean_relative_moving
-    found = held_out_difference(ROBOT, model, [run], predicted, [trained], (now, errors))
+    predicted = [model.predicted(robot, run)]
+    now = errors_on(robot, [run], predicted).mean_relative_moving
+    found = held_out_difference(robot, model, [run], predicted, [trained], (now, errors))
     return found[0].text if found else ""
 
 
@@ -64,6 +68,11 @@ def test_a_mount_is_told_by_its_angle() -> None:
     down = ROBOT.model.gravity.linear
     leaning = ROBOT.with_gravity(np.linalg.norm(down) * np.array([np.sin(0.1), 0.0, -np.cos(0.1)]))
     assert "gravity 5.7° elsewhere" in said(robot=leaning)
+
+
+def test_without_gravity_no_mount_is_sought() -> None:
+    weightless = ROBOT.with_gravity(np.zeros(3))
+    assert "friction of" in said(mounted=weightless, values=0.6 * VALUES)
 
 
 def test_offsets_and_gains_are_told_and_what_none_of_these_is() -> None:

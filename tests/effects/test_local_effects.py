@@ -5,15 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from excite_cli.dynamics.rigid_body import RigidBody
 from excite_cli.effects.base import Signals
+from excite_cli.effects.base_tilt import BaseTilt
 from excite_cli.effects.cable_force import CableForce
 from excite_cli.effects.catalogue import kind_named
 from excite_cli.effects.coupled_friction import CoupledFriction
 from excite_cli.effects.nonlinear_viscous_friction import NonlinearViscousFriction
+from excite_cli.effects.payload import Payload
 from excite_cli.effects.spring import Spring
 from excite_cli.effects.stribeck_friction import StribeckFriction
 from excite_cli.effects.torque_delay import TorqueDelay
 from excite_cli.effects.torque_saturation import TorqueSaturation
+from excite_cli.identification.regression import carried_by, with_effects
 from excite_cli.robot.model import Array
 from tests.effects.motions import signals_of
 from tests.robot.random_robots import random_robot
@@ -123,6 +127,39 @@ def test_torque_delay_is_a_shift_in_time() -> None:
     assert missed < 0.05 * np.linalg.norm((late - signals.torque)[inner])
     assert TorqueDelay.places(ROBOT) == [(0, 1, 2), (0,), (1,), (2,)]
     assert TorqueDelay((1,)).rows(3) == (1,)
+
+
+def test_a_delay_leaves_jumps_where_they_are() -> None:
+    """Where a joint turns back, and where it stands and its speed flickers about zero."""
+    torque = SIGNALS.torque + 5.0 * np.sign(SIGNALS.v)
+    v = SIGNALS.v.copy()
+    v[50:60, 0] = 1e-6 * (-1.0) ** np.arange(10)
+    seen = Signals(**{**vars(SIGNALS), "v": v, "torque": torque})
+    columns = TorqueDelay((0, 1, 2)).columns(seen)[:, :, 0]
+    back = np.signbit(v)
+    turns = np.flatnonzero(back[1:, 1] != back[:-1, 1])
+    assert len(turns) > 0
+    assert not columns[turns, 1].any()
+    assert not columns[turns + 1, 1].any()
+    assert not columns[50:60, 0].any()
+    elsewhere = np.setdiff1d(np.arange(len(v)), [*turns, *(turns + 1)])
+    smooth = -SIGNALS.rate(SIGNALS.torque[:, 1])
+    away = [k for k in elsewhere if not {k - 1, k + 1} & {*turns, *(turns + 1)}]
+    assert columns[away, 1] == pytest.approx(smooth[away])
+
+
+def test_a_base_that_leans_draws_on_what_is_carried() -> None:
+    """As it draws on the same bodies if they are the robot's own."""
+    effects = (BaseTilt((0, 1, 2)), Payload((2,)))
+    values = np.array([0.05, -0.02, 1.5, 0.1, 0.0, 0.2, 0.02, 0.0, 0.02, 0.0, 0.0, 0.02])
+    seen = with_effects(SIGNALS, effects, values)
+    phi = SIGNALS.body.phi + carried_by(effects, values, ROBOT, SIGNALS.run)
+    own = RigidBody(ROBOT, phi, SIGNALS.q, SIGNALS.v, SIGNALS.a)
+    alone = BaseTilt((0, 1, 2)).columns(Signals(**{**vars(SIGNALS), "body": own}))
+    assert BaseTilt((0, 1, 2)).columns(seen) == pytest.approx(alone)
+    assert seen.torque == pytest.approx(own.load + alone @ values[:2])
+    assert np.abs(alone - BaseTilt((0, 1, 2)).columns(SIGNALS)).max() > 1.0
+    assert seen.cut(slice(0, 5)).whole_body.q.shape == (5, 3)
 
 
 def test_torque_saturation_is_a_clipped_torque() -> None:
