@@ -25,6 +25,14 @@ from tests.api.conftest import Loop
 from tests.api.conftest import loop as loop
 
 RNG = np.random.default_rng(5)
+
+
+@pytest.fixture(autouse=True)
+def the_same_numbers() -> None:
+    """Whichever tests ran before, on this worker or another."""
+    RNG.bit_generator.state = np.random.default_rng(5).bit_generator.state
+
+
 SIZE = 2000
 FILTERED = Processing(500.0, 8.0, 4.0, 16.0, 1, 0.1, "central", 0.02, 1.0)
 
