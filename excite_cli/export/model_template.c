@@ -640,12 +640,29 @@ static void rates(size_t count, real step, const real *x, real *out)
     }
 }
 
-/* Dry friction jumps where a joint turns back: a jump has no rate. */
+static int turns_back(size_t count, const real *v, size_t k, int j)
+{
+    const int ahead = !signbit(v[k * N + j]);
+    return (k && ahead != !signbit(v[(k - 1) * N + j]))
+        || (k + 1 < count && ahead != !signbit(v[(k + 1) * N + j]));
+}
+
+/* Dry friction jumps where a joint turns back. A jump has no rate: there, a line from one instant
+ * without to the next. */
 static void no_jumps(size_t count, const real *v, real *rate)
 {
-    for (size_t i = N; i < count * N; ++i)
-        if (!signbit(v[i]) != !signbit(v[i - N]))
-            rate[i] = rate[i - N] = 0;
+    for (int j = 0; j < N; ++j)
+        for (size_t k = 0; k < count; ++k) {
+            const size_t first = k;
+            while (k < count && turns_back(count, v, k, j))
+                ++k;
+            const real before = first ? rate[(first - 1) * N + j] : 0;
+            const real after = k < count ? rate[k * N + j] : before;
+            for (size_t i = first; i < k; ++i) {
+                const real u = (real)(i + 1 - first) / (real)(k + 1 - first);
+                rate[i * N + j] = first ? (1 - u) * before + u * after : after;
+            }
+        }
 }
 
 /* Numbers that excite_series needs to work with. */

@@ -3,6 +3,7 @@
 import ctypes
 import logging
 import os
+import re
 import signal
 import sys
 import time
@@ -31,6 +32,11 @@ def printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Printed:
     return run
 
 
+def in_time(printed: str) -> str:
+    """Without what is said of a wait: how long one waits is the machine's."""
+    return re.sub(r"^.*; [0-9]+ s so far.*\n", "", printed, flags=re.MULTILINE)
+
+
 @pytest.mark.parametrize(
     "arguments", [("schema",), ("check", SMOKE, "none.h5"), ("optimise",), ("robots", "ur10"), ()]
 )
@@ -38,10 +44,10 @@ def test_the_same_as_in_a_process_of_its_own(
     arguments: tuple[str, ...], tmp_path: Path, cache: Path
 ) -> None:
     here, apart = Program(tmp_path, cache)(*arguments), Installed(tmp_path, cache)(*arguments)
-    assert (here.returncode, here.stdout, here.stderr) == (
+    assert (here.returncode, here.stdout, in_time(here.stderr)) == (
         apart.returncode,
         apart.stdout,
-        apart.stderr,
+        in_time(apart.stderr),
     )
     assert here.stdout or here.stderr
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from excite_cli.diagnosis.records import Assumption, Diagnosis
+from excite_cli.diagnosis.records import HELD_OUT_DIFFERS, Assumption, Diagnosis
 from excite_cli.diagnosis.verdict import HeldOutVerdict
 from excite_cli.diagnosis.words import assumption_in_words
 from excite_cli.effects.catalogue import EVERYDAY, EVERYDAY_FRICTION
@@ -49,7 +49,8 @@ def differences(one: Diagnosis, other: Diagnosis) -> set[str]:
 
 def unjudged(found: Diagnosis) -> Diagnosis:
     effects = tuple(replace(each, verdict=None, removes={}, parts={}) for each in found.effects)
-    return replace(found, effects=effects)
+    findings = tuple(each for each in found.findings if each.kind != HELD_OUT_DIFFERS)
+    return replace(found, effects=effects, findings=findings)
 
 
 def same(one: Any, other: Any) -> bool:
