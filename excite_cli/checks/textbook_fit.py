@@ -170,8 +170,8 @@ class TextbookFit:
         for _ in range(_TRIMS):
             found = fit(setup)
             counted = self.counted(setup) & found.judged
-            torque = np.where(counted, setup.torque(self.samples), np.nan)
-            size = np.nan_to_num(np.nanvar(torque, axis=0), nan=1.0)
+            torque = np.where(counted, setup.torque(self.samples), 0.0)
+            size = np.square(torque).sum(axis=0) / np.maximum(counted.sum(axis=0), 1)
             left = np.square(self.left(setup, found)) / np.maximum(size * found.shares**2, 1e-18)
             wrong = np.where(counted, left, 0.0).sum(axis=1)
             kept = wrong <= np.quantile(wrong, 1.0 - share)
