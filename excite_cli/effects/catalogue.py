@@ -53,6 +53,7 @@ EFFECTS: Registry[Effect] = Registry(
         "torque_offset": "torque_offset:TorqueOffset",
         "covariate_offset": "covariate_offset:CovariateOffset",
         "torque_gain": "torque_gain:TorqueGain",
+        "torque_crosstalk": "torque_crosstalk:TorqueCrosstalk",
         "torque_delay": "torque_delay:TorqueDelay",
         "wrench_gain": "wrench_gain:WrenchGain",
         "torque_saturation": "torque_saturation:TorqueSaturation",

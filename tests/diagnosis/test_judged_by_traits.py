@@ -49,6 +49,7 @@ STATED: Mapping[str, tuple[float, int, bool]] = {
     "spring": (12.0, 2, True),
     "torque_offset": (1.0, 2, True),
     "torque_gain": (4.0, 2, True),
+    "torque_crosstalk": (6.0, 3, False),
     "torque_delay": (4.0, 2, False),
     "wrench_gain": (4.0, 2, True),
     "torque_saturation": (4.0, 3, False),

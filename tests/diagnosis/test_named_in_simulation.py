@@ -69,6 +69,18 @@ def test_a_damped_bristle_is_found_with_its_damping() -> None:
     assert friction.value == pytest.approx(5.0, abs=0.3)
 
 
+def test_part_of_another_joints_torque_is_named_with_its_share() -> None:
+    """Of the second joint's whole torque, friction included, in the elbow's and not the reverse."""
+    rubs = planted("coulomb_friction", PITCH, 6.0)
+    leaks = planted("torque_crosstalk", (ELBOW, PITCH), 0.06)
+    data = played((rubs, leaks), (1, 2, 3, 4), 4.0)
+    found = {e.effect.kind: e for e in told(data, "all").effects}
+    assert set(found) == {"coulomb_friction", "torque_crosstalk"}
+    named = found["torque_crosstalk"]
+    assert named.effect.joints == ("elbow", "shoulder_pitch")
+    assert named.parameters["share"].value == pytest.approx(0.06, abs=0.002)
+
+
 GEAR = (
     "viscous_friction,coulomb_friction,load_dependent_friction,gear_loss,torque_gain,torque_offset,"
     "stribeck_friction,position_friction,dahl_friction,spring"

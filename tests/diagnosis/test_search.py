@@ -306,6 +306,21 @@ def test_what_does_not_hold_in_the_end_leaves_its_place_to_another() -> None:
     assert set(CandidateSearch(judge).run()) == {0}
 
 
+@pytest.mark.parametrize(("sizes", "left"), [((2.0, 0.5), [0]), ((0.5, 2.0), [1])])
+def test_what_makes_the_size_of_another_impossible_leaves_if_it_is_the_weaker(
+    sizes: tuple[float, float], left: list[int]
+) -> None:
+    data, candidates = planted([OFFSET, ARMATURE], sizes)
+
+    def allowed(parameters: Array, chosen: Sequence[int], added: Sequence[int]) -> bool:
+        """The first has no possible size beside the second."""
+        return not (0 in added and 1 in chosen)
+
+    evidence = data.evidence(candidates, ONE)
+    judge = Judgement(evidence, evidence, candidates, NO_VETO, allowed)
+    assert CandidateSearch(judge).pruned([0, 1]) == left
+
+
 def judge_of_three() -> Judgement:
     effects = [VISCOUS, ARMATURE, OFFSET]
     return judged(*planted(effects, [5.0, 3.0, 2.0]))

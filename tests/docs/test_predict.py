@@ -70,6 +70,7 @@ PLANTED: Sequence[tuple[str, tuple[int, ...], Mapping[str, float], Sequence[floa
     ("torque_offset", (PAN,), {}, [6.0]),
     ("covariate_offset", (WRIST_1,), {"reference": 30.0}, [0.15]),
     ("torque_gain", (WRIST_2,), {}, [0.2]),
+    ("torque_crosstalk", (PAN, ELBOW), {}, [0.05]),
     ("torque_delay", OF_ALL, {}, [0.01]),
     ("torque_saturation", (LIFT,), {"level": 80.0}, [1.0]),
 )  # fmt: skip

@@ -305,6 +305,9 @@ def test_recorded_torque_is_shifted_scaled_and_late(robot: Robot, clean: Simulat
     scaled = played(robot, planted("torque_gain", joint, 0.1)).dataset.runs[0].tau
     assert scaled[:, ELBOW] == pytest.approx(1.1 * true.tau[:, ELBOW])
     assert np.array_equal(scaled[:, 0], true.tau[:, 0])
+    leaks = played(robot, planted("torque_crosstalk", (ELBOW, 1), 0.1)).dataset.runs[0].tau
+    assert leaks[:, ELBOW] == pytest.approx(true.tau[:, ELBOW] + 0.1 * true.tau[:, 1])
+    assert np.array_equal(np.delete(leaks, ELBOW, 1), np.delete(true.tau, ELBOW, 1))
     late = played(robot, planted("torque_delay", tuple(range(6)), 0.02)).dataset.runs[0].tau
     lags = np.arange(-30, 31)
     for j in range(3):
@@ -382,6 +385,7 @@ CHANGED = {
     "contact": {"pushes"},
     "torque_offset": {"offset"},
     "covariate_offset": {"recorded"},
+    "torque_crosstalk": {"recorded"},
     "torque_delay": {"delay"},
     "torque_saturation": {"reading"},
 }
