@@ -30,15 +30,13 @@ test: $(STAMP)           ## lint, types, import directions, and the tests that g
 	$(MAKE) -j 2 lint suite
 
 test-all: test           ## the same, with batteries, real logs, notebooks, documents, hostile files
-	$(MAKE) suite TESTS="$(LONG)"
+	$(MAKE) suite TESTS=long
 
-# Whole ways through the program: minutes, and hardly one of them fails alone.
-LONG := tests/benchmarks tests/docs tests/end_to_end tests/examples tests/trust tests/trust_files \
-  tests/cli/test_help_examples.py
-TESTS := tests $(addprefix --ignore ,$(LONG))
+# `long`: marked so, or in the folders that tests/conftest.py names.
+TESTS := not long
 # Every test that starts the program would compile all of it again where nothing is kept of that.
-suite: $(STAMP)          ## tests alone: those of `make test`, or TESTS
-	OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest $(TESTS) -n 2 --dist worksteal -q --durations 15
+suite: $(STAMP)          ## tests alone: those of `make test`, or TESTS="long"
+	OPENBLAS_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest tests -m "$(TESTS)" -n 2 --dist worksteal -q --durations 15
 
 sanitize: $(STAMP)       ## the kernels' tests on a build with the address and UB sanitizers (gcc)
 	$(BIN)/python -m pytest -q -rs tests/kernels/test_sanitized.py

@@ -68,6 +68,7 @@ def test_what_is_slowed_down_is_planned_for_any_lower_speed() -> None:
     assert "joint_torque_standing" in names
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "trajectory",
     [

@@ -30,6 +30,7 @@ def scored(data: Dataset, file: Path, *changes: str) -> Score:
     return score(Model.load(file), data, held_out=True)
 
 
+@pytest.mark.long
 def test_a_model_with_the_friction_of_the_robot_drifts_less(data: Dataset, tmp_path: Path) -> None:
     right, bare = scored(data, tmp_path / "right.h5", FRICTION), scored(data, tmp_path / "bare.h5")
     assert [each.horizon for each in right.drift] == [0.1, 1.0], "the log lasts six seconds"

@@ -48,6 +48,7 @@ def arrays(loop: Loop, tables: dict[str, dict[str, np.ndarray]]) -> Dataset:
     return Dataset.from_arrays(joints, t, q, tau, names=list(tables))
 
 
+@pytest.mark.long
 def test_parameters_are_those_of_a_csv_to_the_last_digit(
     loop: Loop, tables: dict[str, dict[str, np.ndarray]], arrays: Dataset, tmp_path: Path
 ) -> None:

@@ -75,6 +75,7 @@ def test_inspections_are_a_mapping(problem: Problem, result: Result, stored: Pat
     assert same["motion_1"].margins == found["motion_1"].margins
 
 
+@pytest.mark.long
 def test_a_file_that_is_read_first_is_shown_as_a_table(loop: Loop) -> None:
     """Whatever else a notebook has imported before: in a process of its own, nothing."""
     for read, path in (("read_result", loop.result), ("read_fit", loop.fit)):

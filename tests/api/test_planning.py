@@ -35,6 +35,7 @@ def between(two: Result) -> float:
     return 0.75 * second + 0.25 * first
 
 
+@pytest.mark.long
 def test_what_is_asked_for_is_reached_in_fewer_seconds(two: Result, tmp_path: Path) -> None:
     problem = until(f"until: {{predicted_deviation: {between(two)}}}")
     result = plan(problem, output=tmp_path / "a.h5")

@@ -41,6 +41,7 @@ class Deadly(Processes):
         return super().map(*arguments, **options)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("task", [identify, diagnose])
 def test_the_same_on_disk_and_on_two_processes_of_which_one_dies(
     task: Any, loop: Loop, monkeypatch: pytest.MonkeyPatch

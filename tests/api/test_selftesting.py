@@ -29,6 +29,8 @@ from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import _noise
 from excite_cli.study.selftest import Outcome
 
+pytestmark = pytest.mark.long
+
 SMOKE = Path(__file__).resolve().parents[2] / "configs" / "smoke.yaml"
 EASY, FAINT = "armature@elbow=0.15", "torque_gain@wrist_roll=0.0001"
 

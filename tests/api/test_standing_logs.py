@@ -84,6 +84,7 @@ def mass_of_tool(case: Case, data: Dataset) -> tuple[float, float]:
     return float(fit.values[place]), float(fit.std[place])
 
 
+@pytest.mark.long
 def test_the_load_is_found_in_the_wrench(case: Case, played: tuple[Dataset, Path]) -> None:
     mass, std = mass_of_tool(case, load_data(case, played[1]))
     assert mass == pytest.approx(0.4 + LOAD, abs=4 * std)
@@ -110,6 +111,7 @@ def test_csv_of_one_file_and_of_several_hold_the_same(
         np.testing.assert_array_equal(run.tau, stored.tau)
 
 
+@pytest.mark.long
 def test_a_bag_with_stamps_of_its_own_tells_the_same_load(
     case: Case, played: tuple[Dataset, Path], tmp_path: Path
 ) -> None:

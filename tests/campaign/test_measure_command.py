@@ -17,6 +17,7 @@ _BEGUN = 5.0  # s within which a program has begun, on a machine that is busy, t
 ODD = ["plain", "c{data}", "{motion}{name}", "-lead", 'it\'s $HOME `id` "x"', "a {} %s \\1 \\g<0>"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("folder", ODD)
 def test_it_gets_motion_log_and_name_as_they_are(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: str
@@ -47,6 +48,7 @@ def test_no_log_and_no_program_are_told(tmp_path: Path) -> None:
         MeasureCommand.of("no-such-program {motion} {data}").take(take_in(tmp_path))
 
 
+@pytest.mark.long
 def test_one_that_hangs_is_told_to_stop_the_robot_and_ended_with_what_it_started(
     tmp_path: Path,
 ) -> None:

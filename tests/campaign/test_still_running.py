@@ -45,6 +45,7 @@ time.sleep(600)
 """
 
 
+@pytest.mark.long
 def test_a_process_that_no_signal_ends_is_said_first(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -66,6 +67,7 @@ def test_a_process_that_no_signal_ends_is_said_first(
     until(lambda: not left_in(tmp_path) and pid not in running(), "the supervisor has ended, too")
 
 
+@pytest.mark.long
 def test_without_proc_the_group_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     words = [sys.executable, "-P", "-c", _SERVE.format(WITHOUT_PROC), *sys.path]
     monkeypatch.setattr(supervised, "command", lambda module: words)

@@ -9,7 +9,10 @@ from tests.campaign.campaign_process import PATIENCE, program, said, start, unti
 from tests.campaign.stubborn_programs import KINDS, alive, command_of, noted
 
 LONG = 600.0  # s: with this grace, nothing but a second signal ends them in time
-pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc"),
+]
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -46,6 +46,7 @@ def end(pid: int) -> None:
         os.kill(pid, signal.SIGKILL)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("leaves", [False, True], ids=["plain", "leaves its environment"])
 def test_a_program_without_campaign_and_supervisor_is_named(leaves: bool, tmp_path: Path) -> None:
     """It bears a mark; where it has put that off, it is of a session that was noted."""
@@ -86,6 +87,7 @@ def test_a_later_process_of_the_same_id_is_not_taken_for_it(tmp_path: Path) -> N
         other.wait()
 
 
+@pytest.mark.long
 def test_the_program_of_a_killed_campaign_is_waited_for_and_its_end_recorded(
     tmp_path: Path,
 ) -> None:
@@ -100,6 +102,7 @@ def test_the_program_of_a_killed_campaign_is_waited_for_and_its_end_recorded(
     assert is_measured(take.data)
 
 
+@pytest.mark.long
 def test_the_limit_of_time_outlives_the_campaign(tmp_path: Path) -> None:
     line = program(tmp_path, BODY.format(seconds=600, leaves=False))
     campaign = start(line, tmp_path, limit=2.0, grace=0.5)
@@ -111,6 +114,7 @@ def test_the_limit_of_time_outlives_the_campaign(tmp_path: Path) -> None:
     assert not take.data.exists()
 
 
+@pytest.mark.long
 def test_a_program_is_ended_without_its_supervisor(tmp_path: Path) -> None:
     """Somebody has killed that; the campaign lives, and ends what it finds."""
     line = program(tmp_path, BODY.format(seconds=600, leaves=True))
@@ -121,6 +125,7 @@ def test_a_program_is_ended_without_its_supervisor(tmp_path: Path) -> None:
     assert "its supervisor was killed" in said(tmp_path)
 
 
+@pytest.mark.long
 def test_a_supervisor_that_is_stopped_does_not_keep_a_program_alive(tmp_path: Path) -> None:
     line = program(tmp_path, BODY.format(seconds=600, leaves=False))
     campaign, pid = begun(line, tmp_path, grace=0.5)

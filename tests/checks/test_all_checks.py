@@ -25,6 +25,8 @@ from excite_cli.simulation.ground_truth import PlantedEffect, plant
 from tests import urdf_elements
 from tests.simulation.arms import arm, played
 
+pytestmark = pytest.mark.long
+
 LOGS = Path(__file__).resolve().parents[2] / "data"
 URDFS = {"kr300": "kr300.urdf", "tx40": "tx40_mdh_modified.urdf", "ur10_cb": "ur10.urdf"}
 SPEC: Spec = load_spec(Path(__file__).resolve().parents[2] / "configs" / "ur10.yaml")

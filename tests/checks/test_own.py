@@ -29,6 +29,7 @@ def block(language: str) -> str:
 _read_anew = read_anew(CHECKS)
 
 
+@pytest.mark.long
 def test_the_check_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     points = tomllib.loads(block("toml"))["project"]["entry-points"][CHECKS.group]
     own_package.install(tmp_path, block("python"), points, monkeypatch, "my_checks", CHECKS.group)

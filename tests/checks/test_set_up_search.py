@@ -27,6 +27,8 @@ from excite_cli.robot.model import Array, Robot
 from excite_cli.simulation.ground_truth import plant
 from tests.simulation.arms import arm, played
 
+pytestmark = pytest.mark.long
+
 SPEC: Spec = load_spec(Path(__file__).resolve().parents[2] / "configs" / "ur10.yaml")
 ROBOT = arm()
 ELBOW, LIFT = "elbow_joint", "shoulder_lift_joint"

@@ -21,6 +21,8 @@ from excite_cli.simulation.ground_truth import plant
 from excite_cli.simulation.simulate import simulate
 from tests.simulation.arms import IDEAL, arm, motion
 
+pytestmark = pytest.mark.long
+
 SPEC: Spec = load_spec(Path(__file__).resolve().parents[2] / "configs" / "ur10.yaml")
 FRICTION = [10.0, 15.0, 8.0, 3.0, 2.0, 1.0]  # N·m
 SHOULDER, ELBOW = "shoulder_lift_joint", "elbow_joint"

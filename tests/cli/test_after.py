@@ -21,6 +21,7 @@ def diagnoses(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return folder / "alias.h5", folder / "clear.h5"
 
 
+@pytest.mark.long
 def test_a_separating_motion_is_a_result_like_any_other(
     excite: Program, diagnoses: tuple[Path, Path]
 ) -> None:

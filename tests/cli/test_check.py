@@ -158,6 +158,7 @@ def test_random_instants_are_counted(excite: Program, two_motions: Run) -> None:
         assert one["violations"] == 0
 
 
+@pytest.mark.long
 def test_a_motion_in_a_controllers_format_is_judged(excite: Program, two_motions: Run) -> None:
     excite.good("export", two_motions.path, "-f", "csv", "--motion", "1", "-o", "m.csv")
     answer = excite.answer("check", SMOKE, "m.csv", "--no-meshes")

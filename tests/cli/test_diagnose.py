@@ -141,6 +141,7 @@ def test_the_file_holds_the_same_diagnosis(outcome: Outcome) -> None:
     assert answer["output"] == {"diagnosis": str(outcome.file), "config": str(outcome.better)}
 
 
+@pytest.mark.long
 def test_the_new_config_needs_nothing_more(outcome: Outcome, excite: Program) -> None:
     spec = load_spec(outcome.better)
     assert spec.effects is not None
@@ -156,6 +157,7 @@ def test_the_new_config_needs_nothing_more(outcome: Outcome, excite: Program) ->
     assert again["error"]["after"] == again["error"]["before"]
 
 
+@pytest.mark.long
 def test_people_get_tables(outcome: Outcome, excite: Program) -> None:
     run = excite.good("diagnose", SMOKE, outcome.data, *QUICK, "--held-out", "motion_1_take_1")
     for words in (
@@ -166,6 +168,7 @@ def test_people_get_tables(outcome: Outcome, excite: Program) -> None:
     assert list(excite.folder.iterdir()) == []  # nothing is written unasked
 
 
+@pytest.mark.long
 def test_overwrite_replaces(outcome: Outcome, excite: Program) -> None:
     path = excite.folder / "found.h5"
     path.write_text("old")
@@ -217,6 +220,7 @@ def mended(
     return path
 
 
+@pytest.mark.long
 def test_a_held_out_error_that_does_not_fall_is_a_bad_answer(mended: Path, excite: Program) -> None:
     """Exit status 1, said first, and nothing is written unasked."""
     better = excite.folder / "better.yaml"
@@ -235,6 +239,7 @@ def test_a_held_out_error_that_does_not_fall_is_a_bad_answer(mended: Path, excit
     assert "--apply-unconfirmed" in run.stderr
 
 
+@pytest.mark.long
 def test_what_is_not_confirmed_is_written_where_that_is_asked_for(
     mended: Path, excite: Program
 ) -> None:
@@ -262,6 +267,7 @@ def test_copies_of_training_data_are_refused_as_held_out(
     assert "is given twice" in excite.refused(command, SMOKE, data, link)
 
 
+@pytest.mark.long
 def test_a_joint_without_torque_is_left_out_and_the_others_are_found(
     data: Path, excite: Program, outcome: Outcome
 ) -> None:
@@ -295,6 +301,7 @@ def test_a_joint_without_torque_is_left_out_and_the_others_are_found(
     assert not [line for line in table.splitlines() if line.startswith("wrist_roll ")]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("asked", [0, 1, 7])
 def test_an_answer_so_far_exists_at_any_time(outcome: Outcome, asked: int) -> None:
     """The search is ended after it asked so many times: what it had is told, and that it ended."""

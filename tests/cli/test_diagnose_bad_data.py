@@ -120,6 +120,7 @@ def test_the_program_ends_with_the_message(
     assert all(word in told for word in words), told
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", CASES)
 def test_every_mistake_has_its_message(
     case: str, recorded: Dataset, config: Path, tmp_path: Path
@@ -134,6 +135,7 @@ def test_every_mistake_has_its_message(
     assert all(word in str(told.value) for word in words), told.value
 
 
+@pytest.mark.long
 def test_names_in_another_order_are_told_by_diagnose_and_identify(
     recorded: Dataset, config: Path, excite: Program
 ) -> None:

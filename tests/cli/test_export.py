@@ -127,6 +127,7 @@ def _planned(excite: Program, *more: str | Path) -> tuple[Any, str]:
     return json.loads(run.stdout)["motions"][0], " ".join(run.stderr.split())
 
 
+@pytest.mark.long
 def test_exported_motions_as_prior_and_start(excite: Program, two_motions: Run) -> None:
     excite.answer("export", two_motions.path, "-f", "npz", "-o", "m.npz")
     both = ("--prior", "m_1.npz", "--prior", "m_2.npz")
@@ -164,6 +165,7 @@ def test_an_exported_motion_is_simulated(excite: Program, two_motions: Run) -> N
     assert max(run["tracking_error"].values()) < 0.02
 
 
+@pytest.mark.long
 def test_set_points_that_lead(excite: Program, two_motions: Run) -> None:
     """Those of the config's drives; refused where they are not known, and of what is no motion."""
     drives = "measurement={torque: command, command: {kp: 400, kd: 20, delay: 0.01}}"

@@ -56,6 +56,7 @@ def test_json_holds_what_scripts_rely_on(folder: Path, robot: Robot, excite: Pro
     assert 0 < error["mean_relative"] < 0.2
 
 
+@pytest.mark.long
 def test_every_output_is_written_can_be_used_and_exported_again(
     folder: Path, robot: Robot, excite: Program
 ) -> None:

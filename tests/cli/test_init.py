@@ -54,6 +54,7 @@ def test_what_lies_elsewhere_is_read_only_when_allowed(excite: Program, tmp_path
     assert load_spec(tmp_path / "arm.yaml").robot.package_dirs == ("src/hand_description",)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("answer", "status"), [("y", 0), ("n", 2)])
 def test_a_terminal_is_asked(tmp_path: Path, cache: Path, answer: str, status: int) -> None:
     with_a_package(tmp_path)

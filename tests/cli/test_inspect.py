@@ -14,6 +14,8 @@ from excite_cli.robot.model import Robot
 from tests.cli.program import Program
 from tests.simulation.arms import arm
 
+pytestmark = pytest.mark.long
+
 CONFIG = """\
 # the arm in the corner
 robot: {urdf: "example-robot-data:ur10"}  # bolted to the wall

@@ -142,6 +142,7 @@ def _words(text: str) -> set[str]:
     return {word for word in text.split() if word.strip("─") and not word[:1].isdecimal()}
 
 
+@pytest.mark.long
 def test_progress_and_messages_fit_on_a_terminal(excite: Program, cache: Path) -> None:
     """What a terminal of 60 columns shows while motions are optimised: no line is cut off."""
     words = [*EXCITE, "optimize", str(SMOKE), "-o", "arm.h5", *BRIEF, "--motions", "1"]

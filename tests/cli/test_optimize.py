@@ -140,6 +140,7 @@ FEW = (
 )  # fmt: skip
 
 
+@pytest.mark.long
 def test_starts_shared_by_two_are_stored_alike(excite: Program) -> None:
     asked = ("optimize", SMOKE, *FEW, "--starts", "2", "--json")
     runs = [excite(*asked, "-o", "alone.h5"), excite(*asked, "-o", "shared.h5", "--workers", "200")]

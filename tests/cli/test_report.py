@@ -36,6 +36,7 @@ def test_the_page_is_named_after_the_file(two_joints: Path, excite: Program) -> 
     assert "exists already" in excite.refused("report", two_joints, *CONFIG, "--no-picture")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("kind", "begins"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
 def test_writes_a_folder_of_figures(
     two_joints: Path, excite: Program, kind: str, begins: bytes

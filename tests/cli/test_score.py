@@ -11,6 +11,8 @@ import pytest
 from tests.cli.conftest import Run
 from tests.cli.program import SMOKE, Program
 
+pytestmark = pytest.mark.long
+
 pytest.importorskip("mujoco")
 
 DECLARED = ("--set", "effects=[{kind: viscous_friction}, {kind: coulomb_friction}]")

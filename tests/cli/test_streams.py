@@ -10,6 +10,8 @@ import pytest
 from tests.cli.conftest import Run
 from tests.cli.program import EXCITE, SMOKE, environment
 
+pytestmark = pytest.mark.long
+
 BROKEN = ("--set", "constraints.joint_limits.acceleration=0.1", "--no-meshes", "--rate", "20")
 
 

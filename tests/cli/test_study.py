@@ -45,6 +45,7 @@ def test_a_study_of_settings(excite: Program) -> None:
     assert (excite.folder / good[0]["files"][0]).stat().st_mtime_ns == before
 
 
+@pytest.mark.long
 def test_a_study_of_logs(excite: Program) -> None:
     robot = build_robot(load_spec(SMOKE).robot, SMOKE.parent)
     phi = true_inertias(robot, 0.2, seed=3)

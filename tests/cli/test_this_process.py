@@ -37,6 +37,7 @@ def in_time(printed: str) -> str:
     return re.sub(r"^.*; [0-9]+ s so far.*\n", "", printed, flags=re.MULTILINE)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "arguments", [("schema",), ("check", SMOKE, "none.h5"), ("optimise",), ("robots", "ur10"), ()]
 )

@@ -88,6 +88,7 @@ def test_a_missing_library_names_the_extra(
     assert "pip install 'excite-cli[view]'" in excite.refused("view", two_joints, *words)
 
 
+@pytest.mark.long
 def test_ctrl_c_exits_with_status_0(two_joints: Path, excite: Program) -> None:
     pytest.importorskip("viser")
     words = ("--no-open", "--json", "--no-progress", "--port", "18080")

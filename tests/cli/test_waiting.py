@@ -71,6 +71,7 @@ def test_how_long_it_will_take() -> None:
         assert told(made) == "diagnose: pass 5; T, 10 s more at most"
 
 
+@pytest.mark.long
 def test_a_terminal_shows_what_is_done(excite: Program) -> None:
     words = [sys.executable, "-m", "excite_cli", "simulate", str(SMOKE), "none.h5", "-o", "d.h5"]
     status, seen = seen_on_a_terminal(words, 80, excite.folder, environment(excite.cache))

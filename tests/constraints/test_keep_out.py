@@ -124,6 +124,7 @@ def _entered(problem: Problem) -> bool:
     return bool(np.any((q[:, 1] > 0.7) & (q[:, 2] < 0.7)))
 
 
+@pytest.mark.long
 def test_with_it_the_region_is_not_entered_and_without_it_it_is() -> None:
     region = "constraints.keep_out={front: {shoulder_pitch: [0.7, 3], elbow: [-3, 0.7]}}"
     assert not _entered(_problem(region))

@@ -68,6 +68,7 @@ def test_quick_margins_are_exact_within_reach_and_bounds_beyond(share: float) ->
     assert np.all((quick >= reach)[~near])
 
 
+@pytest.mark.long
 def test_with_it_the_margin_is_kept_and_without_it_the_table_is_hit() -> None:
     problem, constraint = _around()
     kept = one_motion(problem)

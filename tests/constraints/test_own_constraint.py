@@ -40,6 +40,7 @@ def kept() -> tuple[Problem, Result]:
     return problem, planned(problem)
 
 
+@pytest.mark.long
 def test_with_it_the_limit_holds_and_without_it_is_broken(kept: tuple[Problem, Result]) -> None:
     problem, result = kept
     assert problem.constraints[-1].name == "joint_power"

@@ -214,6 +214,7 @@ def overload(robust: bool) -> float:
     return float(np.max([np.abs(torque) / limits for torque in torques]))
 
 
+@pytest.mark.long
 def test_a_robust_motion_keeps_its_torque_on_every_robot_and_a_plain_one_does_not() -> None:
     assert overload(robust=True) < 1.0
     assert overload(robust=False) > 1.0

@@ -23,6 +23,7 @@ def _problem(*settings: str) -> Problem:
     return smoke(*COMMON, *settings)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", LIMITS)
 def test_with_it_the_limit_holds_and_without_it_it_is_broken(name: str) -> None:
     """At the controller's rate."""

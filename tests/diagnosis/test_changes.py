@@ -23,6 +23,8 @@ from tests.diagnosis.simulated_arm import (
     told,
 )
 
+pytestmark = pytest.mark.long
+
 RUNS = 6
 KINDS = "viscous_friction,coulomb_friction,torque_offset,torque_gain,friction_change,payload"
 

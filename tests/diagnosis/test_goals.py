@@ -14,6 +14,8 @@ from excite_cli.excitation.result import Result
 from excite_cli.excitation.run import new_result
 from tests.excitation.smoke import planned, smoke
 
+pytestmark = pytest.mark.long
+
 KIND = "load_dependent_friction"
 
 

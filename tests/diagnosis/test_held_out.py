@@ -15,6 +15,8 @@ from excite_cli.measurement.dataset import Dataset, Finding, Run
 from excite_cli.robot.model import Array
 from tests.diagnosis.simulated_arm import ELBOW, PITCH, ROBOT, planted, played, told
 
+pytestmark = pytest.mark.long
+
 RATE = 200.0
 # What may differ: what is measured on the held-out part, and the time it took.
 FREE = {"before", "after", "textbook", "untouched", "held_out_traces", "seconds"}

@@ -17,6 +17,8 @@ pytest.importorskip("mujoco")
 
 from benchmarks.battery.outside import DahlBySpeed, HardeningSpring, MaxwellSlip
 
+pytestmark = pytest.mark.long
+
 MEANS = {0.0: "coulomb_friction", 1.0: "viscous_friction"}
 
 

@@ -99,6 +99,7 @@ def test_what_was_tested_and_not_found_is_kept_for_the_next_motion() -> None:
     assert kinds <= {each.kind for each in planned.problem.extension.effects}
 
 
+@pytest.mark.long
 def test_stale_messages_change_neither_names_nor_sizes() -> None:
     """3 % of the samples at 500 Hz: hardly an average is free of them, and hardly one is lost."""
     data, rng = recorded(rate=500.0), np.random.default_rng(0)

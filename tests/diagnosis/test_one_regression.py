@@ -7,6 +7,8 @@ import pytest
 
 from excite_cli import diagnose, identify, load_case, load_data
 
+pytestmark = pytest.mark.long
+
 DATA = Path(__file__).resolve().parents[2] / "data"
 KINDS = ("viscous_friction", "coulomb_friction", "torque_offset")
 

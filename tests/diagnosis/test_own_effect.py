@@ -18,6 +18,8 @@ from tests.diagnosis.simulated_arm import ELBOW, ROBOT, PlantedEffect, planted, 
 from tests.effects import own_package
 from tests.registries import forget
 
+pytestmark = pytest.mark.long
+
 OWN = "roller_friction"
 RIVALS = ("viscous_friction", "coulomb_friction", "asymmetric_friction", "spring")
 Named = dict[str, tuple[float, ...]]

@@ -197,6 +197,7 @@ def _judge(problem: Problem, chain: Chain, posture: Array) -> None:
     assert np.abs(np.gradient(q, times, axis=0)[1:-1] - v[1:-1]).max() < 1e-3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_program_is_smooth_at_rest_at_its_ends_and_admissible(family: str) -> None:
     problem = _problem(FAMILIES[family])

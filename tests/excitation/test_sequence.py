@@ -69,6 +69,7 @@ def alone(problem: Problem) -> tuple[Motion, ...]:
     return _motions(problem, Here(), [])
 
 
+@pytest.mark.long
 def test_two_workers_find_the_same(
     problem: Problem, alone: tuple[Motion, ...], two: Processes
 ) -> None:
@@ -252,6 +253,7 @@ def test_the_best_so_far_is_stored_and_made_anew(tmp_path: Path, motion: int) ->
     np.testing.assert_array_equal(resumed.stack.factor, whole.stack.factor)
 
 
+@pytest.mark.long
 def test_of_several_starts_it_is_the_best(tmp_path: Path) -> None:
     """Also of those that other processes have told before they were ended."""
     problem, path = slow("optimizer.restarts=4"), tmp_path / "cut.h5"

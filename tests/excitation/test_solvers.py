@@ -135,6 +135,7 @@ def test_stages_that_are_run_one_by_one_lead_as_far_as_all_at_once(problem: Prob
     )
 
 
+@pytest.mark.long
 def test_motions_pass_where_a_constraint_bends_along_the_way() -> None:
     """Panda's fifth and seventh links are within 5 mm of their margin nearly everywhere.
 

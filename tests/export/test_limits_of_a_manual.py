@@ -6,6 +6,7 @@ Numbers, sampling and differences are written here once more, apart from the pro
 from typing import Any
 
 import numpy as np
+import pytest
 
 from excite_cli.config.load_spec import parse_spec
 from excite_cli.excitation.problem import Problem, build_problem
@@ -59,12 +60,14 @@ def shares(planned: Problem) -> Any:
     )
 
 
+@pytest.mark.long
 def test_a_motion_planned_with_the_preset_keeps_the_manual() -> None:
     used = shares(problem(USUAL))
     assert (used < 1).all()
     assert used[:2].max() > 0.95
 
 
+@pytest.mark.long
 def test_jerk_is_kept_with_its_limit_and_broken_without() -> None:
     assert (shares(problem(FAST)) < 1).all()
     without = [f"robot.limits.panda_joint{k}.jerk=1e9" for k in range(1, 8)]

@@ -25,6 +25,8 @@ from tests.export.test_c_model import (
     thresholds,
 )
 
+pytestmark = pytest.mark.long
+
 LEVELS = [["-O2"], ["-O3", "-ffast-math"], ["-Ofast"]]
 BUILDS = list(product(COMPILERS, LEVELS))
 NAMED = [f"{compiler} {' '.join(level)}" for compiler, level in BUILDS]

@@ -70,6 +70,7 @@ def written(files: dict[str, str], folder: Path) -> Path:
     return folder
 
 
+@pytest.mark.long
 def test_it_says_what_python_says_of_bodies_rotors_springs_and_friction(tmp_path: Path) -> None:
     made = stored(*of_ur10(KINDS))
     robot = made.robot

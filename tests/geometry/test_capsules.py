@@ -53,6 +53,7 @@ def gaps(points: np.ndarray, start: np.ndarray, end: np.ndarray, radius: float) 
     return np.linalg.norm(points - start - share[:, None] * along, axis=1) - radius
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "most"), [("talos", 45), ("ur10", 15), ("panda", 16)])
 def test_every_mesh_lies_inside_few_capsules_of_its_link(name: str, most: int) -> None:
     robot, capsules = robot_of(name), capsules_of(name)

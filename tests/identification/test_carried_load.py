@@ -79,6 +79,7 @@ def loaded(runs: Dataset) -> Dataset:
     return replace(runs, runs=runs.runs[4:])
 
 
+@pytest.mark.long
 def test_mass_centre_and_inertia(case: Case, loaded: Dataset, fit: Path) -> None:
     found = identify_load(case, loaded, fit)
     assert (found.link, found.joint, found.possible) == ("tool", "slide", True)
@@ -165,6 +166,7 @@ def planned(case: Case, fit: Path) -> LoadProblem:
     return plan_load(case, fit, seconds=(3.0, 5.0))
 
 
+@pytest.mark.long
 def test_the_planned_motion_tells_a_load_as_well_as_expected(
     case: Case, runs: Dataset, fit: Path, planned: LoadProblem
 ) -> None:
@@ -199,6 +201,7 @@ def test_what_is_expected_shrinks_with_time(case: Case, fit: Path, planned: Load
     assert 1.3 < ratio < 2.1  # two, less what the fit itself does not know
 
 
+@pytest.mark.long
 def test_the_commands(folder: Path, case: Case, loaded: Dataset, fit: Path) -> None:
     program = Program(folder, folder / "cache")
     write_dataset(folder / "loaded.h5", loaded)

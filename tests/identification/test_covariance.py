@@ -28,6 +28,7 @@ def naive(runs: list[RunRows], fit: LinearFit) -> np.ndarray:
     return np.sqrt(np.diag(solve(stacked(factors, fit.noise)).inverse))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["ols", "wls", "irls"])
 def test_intervals_cover_the_truth_when_noise_remembers(method: str) -> None:
     rng = np.random.default_rng(5)

@@ -65,6 +65,7 @@ def law_of_log(data: Dataset, problem: Case) -> FoundLaw:
     return find_law(problem.robot, problem.base, runs, problem.spec)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("delay", "rate"), [(0.0, 250.0), (0.009, 250.0), (0.02, 100.0)])
 def test_a_delay_is_found_within_a_millisecond(delay: float, rate: float) -> None:
     found = law_of_log(followed(delay, rate), case(kp=joints(KP), kd=joints(KD)))
@@ -73,6 +74,7 @@ def test_a_delay_is_found_within_a_millisecond(delay: float, rate: float) -> Non
     assert found.gain_std is None
 
 
+@pytest.mark.long
 def test_a_drive_that_saturates_is_found_with_its_limit() -> None:
     told = case(kp=joints(KP), kd=joints(KD))
     free = law_of_log(followed(), told)
@@ -132,6 +134,7 @@ def followed_with(problem: Case) -> Dataset:
     return with_torques(followed(), problem.spec.measurement)
 
 
+@pytest.mark.long
 def test_identified_as_by_torque_sensors() -> None:
     """Masses, friction and rotors are those of the robot, by set points and positions alone."""
     found = identify(case(kp=joints(KP), kd=joints(KD)), followed(), tell=lambda note: None)

@@ -21,6 +21,8 @@ from excite_cli.simulation.simulate import simulate
 from excite_cli.trajectory.fourier import FourierTrajectory
 from tests.cli.program import SMOKE
 
+pytestmark = pytest.mark.long
+
 pytest.importorskip("mujoco")
 EFFECTS = "effects: [{kind: viscous_friction}, {kind: coulomb_friction}]"
 SPEC = parse_spec(f"{{robot: {{urdf: x}}, {EFFECTS}, identification: {{consistent: false}}}}")

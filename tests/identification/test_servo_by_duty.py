@@ -12,6 +12,8 @@ from excite_cli import identify, load_case
 from excite_cli.identification.fit import Fit
 from excite_cli.identification.identify import Identification
 
+pytestmark = pytest.mark.long
+
 mujoco = pytest.importorskip("mujoco")
 
 RATIO, K_T, OHM, COUNT = 345.0, 0.0012, 2.1, 2.0 * np.pi / 4096

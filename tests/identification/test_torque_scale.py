@@ -99,6 +99,7 @@ def test_without_one_every_deviation_holds_that_of_the_gains(data: Dataset) -> N
     assert abs(sure.value - MASS) > 4.0 * sure.std  # gains taken to be one: wrong, and sure of it
 
 
+@pytest.mark.long
 def test_a_diagnosis_finds_every_gain_by_it(data: Dataset) -> None:
     """Each alone is at odds with the inertias: only all of them explain what the payload shows."""
     kinds = "diagnosis: {kinds: [torque_gain, torque_offset, payload]}\n"

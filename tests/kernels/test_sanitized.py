@@ -28,6 +28,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return compiled(tmp_path_factory.mktemp("sanitized"))
 
 
+@pytest.mark.long
 def test_kernels_are_clean(library: Path) -> None:
     run = python(library, _TESTS)
     assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]

@@ -18,6 +18,8 @@ from excite_cli.robot.urdf_joints import survey
 from tests.proposal.robots import GOOD, TETRAHEDRON, arm, joint, link, serial, written
 from tests.summary.two_arms import two_arms
 
+pytestmark = pytest.mark.long
+
 BOTTOM = 'lower="0" upper="2.5" velocity="3" effort="50"'
 
 

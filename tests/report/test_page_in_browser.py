@@ -46,6 +46,7 @@ def page(browser: Any, address: str) -> Iterator[Any]:
     assert complaints == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("width", [390, 1280])
 def test_nothing_is_wider_than_the_window(page: Any, width: int) -> None:
     page.set_viewport_size({"width": width, "height": 850})

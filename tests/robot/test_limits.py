@@ -40,6 +40,8 @@ from tests.robot.formats.test_sdf import joint as sdf_joint
 from tests.robot.formats.test_sdf import link as sdf_link
 from tests.urdf_elements import robot_text
 
+pytestmark = pytest.mark.long
+
 KINDS = {"revolute": "hinge", "prismatic": "slide"}
 
 

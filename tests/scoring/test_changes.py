@@ -46,6 +46,7 @@ def test_a_step_has_its_day_and_size_beside_a_temperature() -> None:
     assert found.columns == ("temp",)
 
 
+@pytest.mark.long
 def test_years_without_a_change_are_left_alone() -> None:
     rng = np.random.default_rng(2)
     false = sum(bool(changes_of(year(rng, swing=-0.05)).significant) for _ in range(200))

@@ -20,6 +20,8 @@ from excite_cli.simulation.settings import SimulationSettings
 from excite_cli.simulation.simulate import simulate
 from excite_cli.trajectory.fourier import FourierTrajectory
 
+pytestmark = pytest.mark.long
+
 COULOMB = (3.0, 4.0, 2.0, 0.6, 4.0)  # N·m, N
 SLOW = (0.05, 0.1, 0.3, 1.0)
 STANDS = "stands"

@@ -15,6 +15,7 @@ from tests.simulation.test_position_drive import DRIVE, KD, KP, QUICK
 LAW = DriveLaw(np.array(KP), np.array(KD), np.full(6, np.inf), 0.02)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("speeds", [False, True])
 def test_the_robot_plays_the_motion(robot: Robot, speeds: bool) -> None:
     pytest.importorskip("mujoco")

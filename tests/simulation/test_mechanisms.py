@@ -107,6 +107,7 @@ FORMULAS: list[tuple[str, float, dict[str, float], Callable[..., Array], Callabl
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("kind", "value", "others", "formula", "size", "most"), FORMULAS)
 def test_effects_of_one_joint_are_their_formulas(
     robot: Robot,

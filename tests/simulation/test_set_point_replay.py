@@ -53,6 +53,7 @@ def errors(
     return set_point_errors(mjcf(robot, model, drive()).text, [run], delay, HORIZONS)
 
 
+@pytest.mark.long
 def test_the_true_robot_is_followed_and_another_is_not(
     robot: Robot, simulation: Simulation
 ) -> None:
@@ -67,6 +68,7 @@ def test_the_true_robot_is_followed_and_another_is_not(
     assert errors(robot, truth(simulation), run, delay=0.01).whole.max() > 10 * true.whole.max()
 
 
+@pytest.mark.long
 def test_errors_are_those_at_the_horizon_over_starts(robot: Robot, simulation: Simulation) -> None:
     """One more joint angle in what was measured at the ends alone shows at that horizon alone."""
     run = recorded(simulation)

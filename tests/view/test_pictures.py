@@ -87,6 +87,7 @@ def test_other_instants_and_sides_look_different(
         assert (np.abs(other - _pixels(plain)).max(axis=2) > 30).mean() > 0.02
 
 
+@pytest.mark.long
 def test_a_gif_of_the_whole_motion(problem: Problem, segment: Segment) -> None:
     """Workers draw the same one."""
     look = replace(SMALL, size=(64, 48), capsules=True)

@@ -168,6 +168,7 @@ CHILD: dict[str, Any] = {"mesh": 0, "translation": AWAY.tolist()}
 BOTH = np.vstack([TURNED, TURNED + AWAY])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("nodes", "roots", "expected"),
     [

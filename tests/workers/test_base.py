@@ -45,6 +45,7 @@ def test_a_repeated_value_travels_as_one() -> None:
         assert np.array_equal(pickle.loads(message), each)
 
 
+@pytest.mark.long
 def test_large_results_of_a_process_outlive_it_and_parts_of_what_it_was_given_come_back() -> None:
     """The file of what is given is open there only while the task is done."""
     factors = (1.0, 2.0, 3.0)

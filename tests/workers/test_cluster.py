@@ -81,6 +81,7 @@ def test_a_missing_library_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
         Cluster("tcp://127.0.0.1:9")
 
 
+@pytest.mark.long
 def test_runs_are_identified_on_a_cluster_as_here(cluster: Cluster, tmp_path: Path) -> None:
     problem = load_problem(SMOKE, ["optimizer.max_iterations=5", "sequence.motions=2"])
     data = tmp_path / "data.h5"

@@ -92,6 +92,7 @@ def test_a_worker_has_its_threads_and_no_part_of_the_current_folder(
     assert set(two.map(work.threads, 0, [1])[0]) == {1}
 
 
+@pytest.mark.long
 def test_errors_travel_as_the_nearest_that_can(two: Processes) -> None:
     with pytest.raises(NoAdmissibleMotionError, match="no way"):
         two.map(work.long_winded, 0, [1])
@@ -102,6 +103,7 @@ def test_errors_travel_as_the_nearest_that_can(two: Processes) -> None:
         two.map(work.unpicklable, 0, [1])
 
 
+@pytest.mark.long
 def test_a_worker_that_dies_costs_its_task_a_second_try(two: Processes, tmp_path: Path) -> None:
     assert two.map(work.dies_once, str(tmp_path), [2, 3, 4, 5]) == [4, 9, 16, 25]
     good, lost = two.map(work.always_dies_at, 1, [0, 1], keep_failures=True)
@@ -152,6 +154,7 @@ workers.map(work.forever, 0, [0, 0], lambda news: print(*workers.pids, flush=Tru
         os.close(end)
 
 
+@pytest.mark.long
 def test_what_is_asked_for_decides_where() -> None:
     assert isinstance(open_workers(), Here)
     with open_workers(2) as workers:

@@ -31,6 +31,7 @@ def given(folder: Path, text: str) -> Urdf:
     return converted(Lethal(), path, text, ConversionRequest())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("text", "words"), [("abort", "fails"), ("grow", "too much memory")])
 def test_a_file_that_ends_the_library_is_one_message(tmp_path: Path, text: str, words: str) -> None:
     with pytest.raises(RobotError, match=rf"^robot\.x: reading it as Lethal .*{words}"):
@@ -83,6 +84,7 @@ def made(robot: Path, monkeypatch: pytest.MonkeyPatch) -> Mock:
     return counted
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "text", "seen"),
     [

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+import pytest
 
 from excite_cli.api.loading import load_problem
 from excite_cli.dynamics.base_parameters import find_base_parameters
@@ -88,6 +89,7 @@ def _robot(folder: Path, name: str, text: str) -> Robot:
     return load_problem(config).robot
 
 
+@pytest.mark.long
 def test_base_parameters_and_torques_agree(tmp_path: Path) -> None:
     texts = {"one.urdf": _urdf(), "one.xacro": _xacro(), "one.xml": _mjcf()}
     texts |= {"one.sdf": _sdf("1.9"), "older.sdf": _sdf("1.4")}

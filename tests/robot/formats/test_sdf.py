@@ -116,6 +116,7 @@ def test_friction_couplings_and_turns_without_end(tmp_path: Path) -> None:
 BASE, JOINT = link("base"), joint("j", "base", "a")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("parts", "words"),
     [

@@ -64,6 +64,7 @@ def test_ros_package_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     assert f"the package 'arm_description' is {there}" in found.notes
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "expression",
     [
@@ -85,6 +86,7 @@ def test_expressions_that_are_programs_are_refused(
     assert not (tmp_path / "written").exists()
 
 
+@pytest.mark.long
 def test_a_package_that_lost_its_name_is_the_one_the_file_lies_in(tmp_path: Path) -> None:
     path = _arm(tmp_path, "arm_support")
     mesh = '<collision><geometry><mesh filename="package://arm_support/m.stl"/></geometry>'
