@@ -49,6 +49,7 @@ EFFECTS: Registry[Effect] = Registry(
         "covariate_friction": "covariate_friction:CovariateFriction",
         "coupled_friction": "coupled_friction:CoupledFriction",
         "armature": "armature:Armature",
+        "coupled_armature": "coupled_armature:CoupledArmature",
         "spring": "spring:Spring",
         "torque_offset": "torque_offset:TorqueOffset",
         "covariate_offset": "covariate_offset:CovariateOffset",

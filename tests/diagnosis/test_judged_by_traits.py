@@ -46,6 +46,7 @@ STATED: Mapping[str, tuple[float, int, bool]] = {
     "covariate_offset": (4.0, 2, False),
     "coupled_friction": (3.0, 2, True),
     "armature": (1.0, 2, True),
+    "coupled_armature": (4.0, 2, False),
     "spring": (12.0, 2, True),
     "torque_offset": (1.0, 2, True),
     "torque_gain": (4.0, 2, True),

@@ -58,6 +58,7 @@ PLANTED: Sequence[tuple[str, tuple[int, ...], Mapping[str, float], Sequence[floa
     ("covariate_friction", (LIFT,), {"reference": 30.0, "curvature": 0.02}, [2.0, -1.0]),
     ("coupled_friction", (WRIST_2, WRIST_3), {"direction": -1.0}, [1.5, 1.5]),
     ("armature", (ELBOW,), {}, [2.0]),
+    ("coupled_armature", (WRIST_1, WRIST_2), {}, [-0.4]),
     ("spring", (WRIST_1,), {}, [5.0, 3.0]),
     ("ripple", (WRIST_2,), {"periods": 8.0}, [1.0, -0.5]),
     ("cable_force", (WRIST_1, WRIST_2), {}, [2.0, 1.0, 1.5]),

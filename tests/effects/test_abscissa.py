@@ -26,7 +26,8 @@ def test_every_kind_can_be_drawn(kind: str) -> None:
     found = effect_kind(place, shape).abscissa(SIGNALS)
     if found is None:  # drawn over the torque that it predicts
         assert kind in {
-            "backlash", "base_tilt", "cable_force", "elasticity", "encoder_offset", "payload",
+            "backlash", "base_tilt", "cable_force", "coupled_armature", "elasticity",
+            "encoder_offset", "payload",
             "torque_delay", "wrench_gain",
         }  # fmt: skip
         return
