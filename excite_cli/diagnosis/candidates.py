@@ -86,6 +86,9 @@ def possible_effects(
         try:
             places = _places(kind, seen.robot, spec)
             effects, tests = _of_kind(kind, places, known, seen, searched)
+            if kind.per_run and kind.shapes and any(at.kind == name for at in around):
+                beside = seen.beside_found()
+                effects += [e for at in places for e in effects_of_runs(kind, at, beside)]
             changed = changes(kind, known_in_runs, seen)
             if kind.kind in EFFECTS.foreign:
                 require_columns([*effects, *(each for each, _ in changed)], seen.signals)

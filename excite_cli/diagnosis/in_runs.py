@@ -8,7 +8,7 @@ set that data tell.
 """
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -37,6 +37,7 @@ Runs = tuple[str, ...]
 class SeenRuns:
     """Training parts, and what they leave: `signals` and `residuals` (T, n) of each.
 
+    `left` (T, n): what the whole model found so far leaves, what is in some runs only included.
     `runs`: names of all runs, trained on or not; `states` those that the configuration declares;
     `measured`: whether sensors gave the torque.
     """
@@ -47,6 +48,11 @@ class SeenRuns:
     runs: Sequence[str]
     states: States = field(default_factory=dict)
     measured: bool = True
+    left: Sequence[Array] = ()
+
+    def beside_found(self) -> "SeenRuns":
+        """The same with what the whole model leaves: where else the like was, at another time."""
+        return replace(self, residuals=self.left, left=())
 
     @cached_property
     def _by_name(self) -> dict[str, list[int]]:

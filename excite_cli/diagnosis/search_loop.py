@@ -300,7 +300,8 @@ def _one_pass(
             if effect.shape or effect.runs
         }
         measured = all(run.unsure is None for run in data.runs)
-        seen = SeenRuns(model.robot, signals, raw, run_names, model.states, measured)
+        left = [body.run.tau_raw - s.torque for body, s in zip(bodies, signals, strict=True)]
+        seen = SeenRuns(model.robot, signals, raw, run_names, model.states, measured, left)
         possible = possible_effects(spec, model.declared, seen, shapes)
         candidates = with_columns(possible, signals, data.runs)
     plain = data.evidence(candidates, NoiseModel.white(fit.levels))
@@ -308,8 +309,8 @@ def _one_pass(
     usual = _usual(candidates, found)
     usual = _of_best_shapes(plain, candidates, usual)
     usual = _with_the_obvious(plain, candidates, usual)
-    left = data.residuals(candidates, usual, plain.solve(usual))
-    noise = fit_noise(left, [run.usable for run in data.runs])
+    rest = data.residuals(candidates, usual, plain.solve(usual))
+    noise = fit_noise(rest, [run.usable for run in data.runs])
     white = data.evidence(candidates, noise)
     placebos = placebos_of(data, candidates, usual, noise, white)
     inflation = placebos.inflation
@@ -453,11 +454,7 @@ def _with_the_obvious(
     for _ in range(_OBVIOUS):
         schur = plain.schur(usual)
         taken = {candidates[i].place for i in usual}
-        free = [
-            i
-            for i, c in enumerate(candidates)
-            if c.place not in taken and (c.effect.is_change or not c.effect.runs)
-        ]
+        free = [i for i, c in enumerate(candidates) if c.place not in taken]
         ranked = sorted(free, key=lambda i: -schur.singles[i].chi2)
         for i in ranked[:4]:
             joints = list(candidates[i].rows)

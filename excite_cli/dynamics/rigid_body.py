@@ -146,10 +146,10 @@ class RigidBody:
                 columns[t, :, axis] = torque[robot.tree.moved]
         return robot.gathered(columns.swapaxes(1, 2)).swapaxes(1, 2)
 
-    def tip_jacobian(self) -> Array:
-        """Jacobian (T, 6, n) of the last moved joint's frame, aligned with the world."""
+    def frame_jacobian(self, joint: int) -> Array:
+        """Jacobian (T, 6, n) of the frame of a moved `joint`, aligned with the world."""
         robot, model = self.robot, self.robot.model
-        data, last = model.createData(), model.njoints - 1
+        data, last = model.createData(), robot.model_joints[joint]
         aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         jacobians = np.empty((len(self.q), 6, robot.tree.n))
         for t, q in enumerate(robot.configurations(self.q)):

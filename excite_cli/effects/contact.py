@@ -1,7 +1,8 @@
-"""Contact: an external force f at the tip during a window of time in one run.
+"""Contact: an external force f on a link during a window of time in one run.
 
-The motors must add −Jᵀ f, with J the linear Jacobian of the last moved joint's frame in axes of the
-world. The parameters are the force on the robot.
+The motors must add −Jᵀ f, with J the linear Jacobian of a joint's frame in axes of the world. The
+parameters are the force on the robot. It acts at the frame of the last of the effect's joints,
+which are those that it may load; people push an arm at its elbow as well as at its end.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,10 +30,11 @@ _CELLS = 96  # per run, for the search of the window
 _SHORTEST = 0.1  # s: what is shorter is a blow or a fault of the record
 _LEAST = 0.1  # N
 _LONGEST = 0.5  # of the run; what lasts longer is no touch
+_FELT = 2  # joints above a frame by which a force on it is told
 
 
 class Contact(Effect):
-    """A force (fx, fy, fz) on the tip from `start` to `end`, in axes of the world; all rows."""
+    """A force (fx, fy, fz) on a link from `start` to `end`, in axes of the world."""
 
     kind: ClassVar = "contact"
     over_time: ClassVar = True
@@ -56,6 +58,15 @@ class Contact(Effect):
     why_not_excitable: ClassVar = "a touch happens in one run; the next motion does not repeat it"
 
     @classmethod
+    def places(cls, robot: Robot) -> list[tuple[int, ...]]:
+        """All joints, and those down to each frame that moves with two others at least.
+
+        What one joint alone feels is any torque.
+        """
+        chains = (_down_to(robot, j) for j in range(robot.n - 1))
+        return [tuple(range(robot.n)), *(chain for chain in chains if len(chain) > _FELT)]
+
+    @classmethod
     def grid(cls, robot: Robot, joints: tuple[int, ...], signals: Sequence[Signals]) -> list[dict]:
         """Windows of 1/2, 1/4, 1/8 and 1/16 of each run, each half over the one before."""
         return [
@@ -76,7 +87,11 @@ class Contact(Effect):
         residuals: Sequence[Array],
     ) -> list[dict]:
         """The window of each run in which a constant force explains most of the residual."""
-        found = [_window(s, np.asarray(r)) for s, r in zip(signals, residuals, strict=True)]
+        own = list(joints)
+        found = [
+            _window(s, np.asarray(r)[:, own], joints)
+            for s, r in zip(signals, residuals, strict=True)
+        ]
         best = sorted((each for each in found if each is not None), key=lambda each: -each[0])
         return [{"start": start, "end": end} for _, start, end in best if end - start > _SHORTEST]
 
@@ -94,21 +109,23 @@ class Contact(Effect):
     def build_into(
         self, robot: SimulatedRobot, values: Array, numbers: Mapping[str, float]
     ) -> None:
-        """A force on the last joint's frame while it lasts."""
-        robot.pushes.append(Push(np.array(values), numbers["start"], numbers["end"]))
+        """A force on the frame while it lasts."""
+        start, end = numbers["start"], numbers["end"]
+        robot.pushes.append(Push(np.array(values), start, end, self.joints[-1]))
 
     def columns(self, signals: Signals) -> Array:
-        """−Jᵀ within the window, else zero, (T, n, 3)."""
+        """−Jᵀ within the window, else zero, (T, len(joints), 3)."""
         inside = (signals.t >= self.shape["start"]) & (signals.t <= self.shape["end"])
-        columns = np.zeros((*signals.q.shape, 3))
+        columns = np.zeros((len(signals.t), len(self.joints), 3))
         if inside.any():
-            columns[inside] = _columns(signals, inside)
+            columns[inside] = _columns(signals, inside, self.joints)
         return columns
 
     def in_c(self, values: Array, columns: Sequence[str]) -> str:
         """−Jᵀ f within the window."""
         start, end = real(self.shape["start"]), real(self.shape["end"])
-        push = all_joints(f"pushed((const real[3]){{{reals(-np.asarray(values))}}}, q, out)")
+        force = reals(-np.asarray(values))
+        push = all_joints(f"pushed({self.joints[-1]}, (const real[3]){{{force}}}, q, out)")
         return f"if (t >= {start} && t <= {end}) {push}"
 
     def absurd(self, values: Array, seen: Seen) -> str:
@@ -121,13 +138,23 @@ class Contact(Effect):
         return Abscissa("time", "s", signals.t)
 
 
-def _columns(signals: Signals, at: NDArray[np.bool_] | slice) -> Array:
+def _down_to(robot: Robot, joint: int) -> tuple[int, ...]:
+    """The joints that carry one, from the base on, and itself."""
+    chain = [joint]
+    while robot.parents[chain[-1]] >= 0:
+        chain.append(robot.parents[chain[-1]])
+    return tuple(reversed(chain))
+
+
+def _columns(signals: Signals, at: NDArray[np.bool_] | slice, joints: tuple[int, ...]) -> Array:
     body = signals.body
     part = RigidBody(body.robot, body.phi, signals.q[at], signals.v[at], signals.a[at])
-    return -np.swapaxes(part.tip_jacobian()[:, :3], 1, 2)
+    return -np.swapaxes(part.frame_jacobian(joints[-1])[:, :3, list(joints)], 1, 2)
 
 
-def _window(signals: Signals, residual: Array) -> tuple[float, float, float] | None:
+def _window(
+    signals: Signals, residual: Array, joints: tuple[int, ...]
+) -> tuple[float, float, float] | None:
     """Energy explained, start and end of the best window, all pairs of two grids."""
     count = len(signals.t)
     if count < 16:
@@ -135,7 +162,7 @@ def _window(signals: Signals, residual: Array) -> tuple[float, float, float] | N
     # Rows count by their own noise, so that a large joint does not drown a wrist.
     scale = np.median(np.abs(residual - np.median(residual, axis=0)), axis=0)
     scale = np.maximum(scale, 1e-6 * np.abs(residual).max() + 1e-12)
-    columns, r = _columns(signals, slice(None)) / scale[:, None], residual / scale
+    columns, r = _columns(signals, slice(None), joints) / scale[:, None], residual / scale
     gram = _sums(np.einsum("tri,trj->tij", columns, columns))
     moment = _sums(np.einsum("tri,tr->ti", columns, r))
     edges = np.unique(np.linspace(0, count, min(_CELLS, count) + 1).astype(int))

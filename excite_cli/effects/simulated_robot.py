@@ -46,11 +46,12 @@ class DryCoupling:
 
 @dataclass(frozen=True)
 class Push:
-    """A force (3,) [N] on the last joint's frame, in axes of the world, from `start` to `end`."""
+    """A force (3,) [N] on the frame of `joint`, in axes of the world, from `start` to `end`."""
 
     force: Array
     start: float
     end: float
+    joint: int
 
 
 class Hysteresis(Protocol):

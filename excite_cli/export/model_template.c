@@ -349,9 +349,12 @@ static inline void tilted(real roll, real pitch, const real *q, real *out)
     rigid(LOADED, change, q, STILL, STILL, out);
 }
 
-/* J' f of a force in the world's axes at the frame of the last joint. */
-static inline void pushed(const real *force, const real *q, real *out)
+/* J' f of a force in the world's axes at the frame of a joint. */
+static inline void pushed(int joint, const real *force, const real *q, real *out)
 {
+    int last = 0;
+    while (JOINT[last].driver != joint || JOINT[last].multiplier != 1)
+        ++last;
     real all[3][M], r[M][9], p[M][3];
     spread(q, STILL, STILL, all);
     for (int j = 0; j < M; ++j) {
@@ -370,11 +373,11 @@ static inline void pushed(const real *force, const real *q, real *out)
         }
     }
     memset(out, 0, N * sizeof(real));
-    for (int j = M - 1; j >= 0; j = JOINT[j].parent) {
+    for (int j = last; j >= 0; j = JOINT[j].parent) {
         real axis[3] = {0, 0, 0}, arm[3], moved[3];
         out_of(r[j], JOINT[j].axis, axis);
         for (int i = 0; i < 3; ++i)
-            arm[i] = p[M - 1][i] - p[j][i];
+            arm[i] = p[last][i] - p[j][i];
         cross(axis, arm, moved);
         const real *way = JOINT[j].slides ? axis : moved;
         out[JOINT[j].driver] += JOINT[j].multiplier

@@ -192,20 +192,21 @@ class _Load:
 
 
 class _Pushing:
-    """Applies forces to the last joint's frame while they last."""
+    """Applies forces to the frames of joints while they last."""
 
     def __init__(self, build: Build, plant: Plant, data: Any) -> None:
-        self._pushes, self._data, self._body = build.pushes, data, plant.bodies[-1]
+        bodies = plant.bodies[np.array(build.robot.model_joints) - 1]
+        self._pushes = [(int(bodies[push.joint]), push) for push in build.pushes]
+        self._data = data
 
     def at(self, t: float) -> None:
         """Set the forces of the instant `t`; MuJoCo wants them at the centre of mass."""
-        active = [push.force for push in self._pushes if push.start <= t <= push.end]
-        external = self._data.xfrc_applied[self._body]
-        external[:] = 0.0
-        if active:
-            force = np.sum(active, axis=0)
-            lever = self._data.xpos[self._body] - self._data.xipos[self._body]
-            external[:3], external[3:] = force, np.cross(lever, force)
+        for body, _ in self._pushes:
+            self._data.xfrc_applied[body] = 0.0
+        for body, push in self._pushes:
+            if push.start <= t <= push.end:
+                lever = self._data.xpos[body] - self._data.xipos[body]
+                self._data.xfrc_applied[body] += [*push.force, *np.cross(lever, push.force)]
 
 
 def _check(build: Build, reference: Reference, q: Array, advice: str) -> None:

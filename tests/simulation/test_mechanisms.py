@@ -221,14 +221,18 @@ def test_an_encoder_reads_less_than_the_truth(robot: Robot, clean: Simulation) -
     assert np.array_equal(true.tau, read.tau)
 
 
-def test_a_contact_pushes_the_last_joint_during_its_window(robot: Robot) -> None:
-    effect = planted("contact", tuple(range(6)), 20.0, fz=-10.0, start=1.0, end=2.0)
+@pytest.mark.parametrize("last", [ELBOW, 5])
+def test_a_contact_pushes_the_frame_of_its_last_joint_during_its_window(
+    robot: Robot, last: int
+) -> None:
+    effect = planted("contact", tuple(range(last + 1)), 20.0, fz=-10.0, start=1.0, end=2.0)
     simulation = played(robot, effect)
     run = simulation.dataset.runs[0]
     left = beyond_rigid(robot, simulation)
     t = inner(run.t)
     body = RigidBody(robot, simulation.truth.phi, *states(run))
-    pushed = inner(-body.tip_jacobian()[:, :3].transpose(0, 2, 1) @ np.array([20.0, 0.0, -10.0]))
+    pushes = -body.frame_jacobian(last)[:, :3].transpose(0, 2, 1)
+    pushed = inner(pushes @ np.array([20.0, 0.0, -10.0]))
     settled = (t > 1.1) & (t < 1.98)
     outside = (t < 0.98) | (t > 2.2)
     assert rms(pushed[settled]).max() > 5.0
