@@ -149,11 +149,11 @@ class RigidBody:
     def frame_jacobian(self, joint: int) -> Array:
         """Jacobian (T, 6, n) of the frame of a moved `joint`, aligned with the world."""
         robot, model = self.robot, self.robot.model
-        data, last = model.createData(), robot.model_joints[joint]
+        data, frame = model.createData(), _frame_of(model, robot.model_joints[joint])
         aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         jacobians = np.empty((len(self.q), 6, robot.tree.n))
         for t, q in enumerate(robot.configurations(self.q)):
-            jacobian = pin.computeFrameJacobian(model, data, q, _frame_of(model, last), aligned)
+            jacobian = pin.computeFrameJacobian(model, data, q, frame, aligned)
             jacobians[t] = jacobian.reshape(6, -1)[:, robot.tree.moved]  # of one column: 1-D
         return robot.gathered(jacobians)
 
