@@ -18,6 +18,7 @@ CHECKS: Registry[Check] = Registry(
         "signs of positions": "joint_sign:PositionSign",
         "signs of torques": "joint_sign:TorqueSign",
         "order of columns": "column_order:ColumnOrder",
+        "coupling of motors": "coupled_motors:CoupledMotors",
         "unit of torques": "torque_unit:TorqueUnit",
         "unit of positions": "position_unit:PositionUnit",
         "gravity left in the torques": "gravity_subtracted:GravitySubtracted",

@@ -104,6 +104,15 @@ Order = Indices
 
 
 @dataclass(frozen=True)
+class Coupling:
+    """The motor of joint `own` turns with v_own + `way` · v_other."""
+
+    other: int
+    own: int
+    way: float
+
+
+@dataclass(frozen=True)
 class Setup:
     """Column `order[j]` of the file, times `sign[j]`, is that of joint j; all (n,).
 
@@ -111,7 +120,7 @@ class Setup:
     `unit`: N·m in one of the file, `turn`: rad in what the config takes for one, where joints turn.
     `clock`: true seconds in one of the stamps. `lag` [s] of the torque behind the positions.
     `weightless`: a controller took the weight off the torque. `loaded`: last bodies with a tool or
-    a load on them.
+    a load on them. `coupled`: torques are those of motors that are coupled so.
     """
 
     gravity: Array
@@ -126,6 +135,7 @@ class Setup:
     lag: float = 0.0
     weightless: bool = False
     loaded: tuple[int, ...] = ()
+    coupled: Coupling | None = None
 
     @classmethod
     def as_declared(cls, robot: Robot) -> "Setup":
@@ -139,6 +149,25 @@ class Setup:
         q, v, a = (x[:, self.q_order] * self.q_sign for x in (samples.q, samples.v, samples.a))
         unit = np.where(samples.turns, self.turn, 1.0)
         return unit * q + self.zero, unit * v / self.clock, unit * a / self.clock**2
+
+    def of_motors(self, torque: Array) -> Array:
+        """Torques (T, n, …) of the motors, from those of the joints: τ_other − way · τ_own.
+
+        τ_m · (v_own + way · v_other) has the power of τ_own.
+        """
+        if self.coupled is None:
+            return torque
+        found = torque.copy()
+        found[:, self.coupled.other] -= self.coupled.way * torque[:, self.coupled.own]
+        return found
+
+    def turned_by(self, rates: Array) -> Array:
+        """Speeds or accelerations (T, n) of the motors, from those of the joints."""
+        if self.coupled is None:
+            return rates
+        found = rates.copy()
+        found[:, self.coupled.own] += self.coupled.way * rates[:, self.coupled.other]
+        return found
 
     def bristles(self, samples: Samples) -> Array:
         """z (T, n, 3) of the joints."""

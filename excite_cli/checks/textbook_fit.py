@@ -131,25 +131,28 @@ class TextbookFit:
         """Y (T, n, P) of the robot so mounted and so moved."""
         q, v, a = setup.motion(self.samples)
         robot = self.robot.with_gravity(setup.gravity)
-        return RigidBody(robot, self.phi, q, v, a).regressor
+        return setup.of_motors(RigidBody(robot, self.phi, q, v, a).regressor)
 
     def weight(self, setup: Setup, phi: Array | None = None) -> Array:
         """Torque (T, n, 3) of bodies φ under 1 m/s² along each axis."""
         q = setup.motion(self.samples)[0]
         phi, rest = self.phi if phi is None else phi, np.zeros_like(q)
         turned = [self.robot.with_gravity(axis) for axis in np.eye(3)]
-        return np.stack([RigidBody(each, phi, q, rest, rest).load for each in turned], axis=-1)
+        along = [RigidBody(each, phi, q, rest, rest).load for each in turned]
+        return setup.of_motors(np.stack(along, axis=-1))
 
     def left(self, setup: Setup, found: TextbookShares) -> Array:
         """Torque (T, n) that bodies and friction leave, those of these or of other samples."""
-        v, a, _, whole, bristles = self._rows(setup)
-        columns = self.columns(setup)
-        load, known = columns @ self.bodies(setup, found.z), columns @ self.phi
-        passive = [
-            _passive(v[:, j], a[:, j], known[:, j], bristles[:, j]) @ found.passive[j]
-            for j in range(len(found.shares))
-        ]
-        return np.asarray(whole - load - np.column_stack(passive))
+        load = self.columns(setup) @ self.bodies(setup, found.z)
+        columns = self.passive(setup)
+        passive = [x @ own for x, own in zip(columns, found.passive, strict=True)]
+        return np.asarray(self._rows(setup)[3] - load - np.column_stack(passive))
+
+    def passive(self, setup: Setup) -> list[Array]:
+        """X (T, k) of every joint: friction, rotor and offset."""
+        v, a, _, _, bristles = self._rows(setup)
+        load = self.columns(setup) @ self.phi
+        return [_passive(v[:, j], a[:, j], load[:, j], bristles[:, j]) for j in range(v.shape[1])]
 
     def missed(self, setup: Setup, found: TextbookShares) -> Array:
         """Shares (n,) of these torques that bodies and friction of other samples miss.
@@ -199,7 +202,7 @@ class TextbookFit:
         torque = setup.torque(self.samples)
         whole = torque + self.weight(setup) @ setup.gravity if setup.weightless else torque
         bristles = setup.bristles(self.samples)[:, :, : None if self._late else 0]
-        return v, a, torque, whole, bristles
+        return setup.turned_by(v), setup.turned_by(a), torque, whole, bristles
 
 
 def _seen(robot: Robot, phi: Array, spread: Array) -> Array:

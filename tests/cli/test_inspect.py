@@ -89,7 +89,7 @@ def test_the_page_has_the_checks_the_evidence_and_the_keys(program: Program) -> 
     assert json.loads(said.stdout)["page"] == "set-up.html"
     page = text_of(program, "set-up.html")
     for text in (
-        "1 of 24 checks found a fault, 1 to be looked at",
+        "1 of 25 checks found a fault, 1 to be looked at",
         "robot.base_orientation",
         "gravity is (",
         "What would change in the config",
