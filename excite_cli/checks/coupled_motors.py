@@ -28,7 +28,8 @@ class CoupledMotors(SetupCheck):
         self, fit: TextbookFit, setup: Setup, explained: TextbookShares
     ) -> Iterator[Alternative]:
         """Either motor of a joint and the one that it carries turns with both."""
-        pairs = [(j, k) for k, j in enumerate(fit.robot.parents) if j >= 0]
+        first = fit.robot.base_joints
+        pairs = [(j, k) for k, j in enumerate(fit.robot.parents) if j >= first]
         either = [each for j, k in pairs for each in ((j, k), (k, j))]
         if setup.coupled is None:
             for (other, own), way in product(either, (1.0, -1.0)):
@@ -74,6 +75,7 @@ class CoupledMotors(SetupCheck):
         }
 
     def is_declared(self, name: str, spec: Spec) -> bool:
-        """Whether shares of other motors are told of the joint."""
+        """Whether its motor, or the share of another one, is described."""
         shares = spec.measurement.coupling
-        return name in shares or any(name in each for each in shares.values())
+        driven = [joint for each in spec.robot.transmissions for joint in each.joints]
+        return name in (*driven, *shares, *(own for each in shares.values() for own in each))

@@ -19,7 +19,7 @@ class TorqueCrosstalk(Effect):
     """The first joint's torque grows by c · (torque of the second)."""
 
     kind: ClassVar = "torque_crosstalk"
-    title: ClassVar = "torque of another joint in the measured torque"
+    title: ClassVar = "share of the second joint's torque in the measured torque of the first"
     signature: ClassVar = "a joint's residual has the shape of another joint's torque"
     scope: ClassVar[Scope] = "pair"
     parameters: ClassVar = (
@@ -29,6 +29,7 @@ class TorqueCrosstalk(Effect):
         ),
     )  # fmt: skip
     data_defect: ClassVar = True
+    of_sensor: ClassVar = True
     prior_cost: ClassVar = 6.0
     tier: ClassVar = Tier.LAST
 
