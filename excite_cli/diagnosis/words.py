@@ -276,18 +276,24 @@ def settled_in_words(found: Diagnosis) -> list[str]:
     kinds = dict.fromkeys(each.kind for each in found.absorbed)
     known = [catalogue()[kind] for kind in kinds if kind in catalogue()]
     return [
-        f"{each.kind} becomes identifiable if {each.identified_by}."
+        f"{capitalised(each.title)} becomes identifiable if {each.identified_by}."
         for each in known
         if each.identified_by
     ]
 
 
+def capitalised(text: str) -> str:
+    """A sentence that begins with this text; names within it stay as they are."""
+    return text[:1].upper() + text[1:]
+
+
 def weighed_in_words(found: Diagnosis) -> list[str]:
     """That held-out data are no test of what is based on the known mass."""
     return [
-        f"{each.effect.kind} on {place_in_words(each.effect, len(found.joint_names))} is based "
+        f"{capitalised(title_of(each.effect.kind))} on "
+        f"{place_in_words(each.effect, len(found.joint_names))} is based "
         f"on the known mass ({KNOWN_MASS}, {KNOWN_LOAD}): other inertias would predict as well "
-        f"without {each.effect.kind}, so held-out data cannot test this effect."
+        "without it, so held-out data cannot test this effect."
         for each in found.effects
         if each.verdict is HeldOutVerdict.WEIGHED
     ]

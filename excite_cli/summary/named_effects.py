@@ -21,6 +21,7 @@ from excite_cli.diagnosis.words import (
     SMALL_PART,
     approximation_in_words,
     by_worth,
+    capitalised,
     changes_in_words,
     held_out_in_words,
     joints_in_words,
@@ -219,9 +220,9 @@ def other_names(named: NamedEffect, everything: int) -> list[str]:
     what, found = what_and_where(named.effect, everything), []
     if named.aliases:
         others = ", ".join(what_and_where(alias, everything) for alias in named.aliases)
-        found.append(f"{_capital(what)} is indistinguishable from: {others}")
+        found.append(f"{capitalised(what)} is indistinguishable from: {others}")
     if same := [title_of(kind) for kind in other_name_of(named.effect.kind)]:
-        found.append(f"{_capital(what)} produces the same torque as {' and '.join(same)}")
+        found.append(f"{capitalised(what)} produces the same torque as {' and '.join(same)}")
     return found
 
 
@@ -234,14 +235,8 @@ def joint_alias_in_words(alias: JointAlias, everything: int) -> str:
     single = len(alias.named) == 1
     if alias.same_torque:
         produce = "produces" if single else "produce"
-        return (
-            f"{_capital(named)} {produce} the same torque as {others}: no motion distinguishes them"
-        )
-    return f"{_capital(named)} {'is' if single else 'are'} indistinguishable from: {others}"
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
+        return f"{capitalised(named)} {produce} the same torque as {others}: no motion distinguishes them"
+    return f"{capitalised(named)} {'is' if single else 'are'} indistinguishable from: {others}"
 
 
 def what_and_where(record: EffectRecord, everything: int) -> str:

@@ -165,8 +165,8 @@ def test_a_scale_that_masses_take_up_is_told_with_what_settles_it(
     run = excite("diagnose", record("base.yaml", *SCALE), "log.h5")
     assert run.returncode == 0
     assert (
-        "wrench_gain becomes identifiable if the robot's mass is known (identification.total_mass)"
-        in run.stdout
+        "Wrong scale of the measured wrench becomes identifiable if the robot's mass is known "
+        "(identification.total_mass)" in run.stdout
     )
 
 

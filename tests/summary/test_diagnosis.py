@@ -309,8 +309,9 @@ def test_what_rests_on_a_weight_is_told_so_and_never_small(weighed: Diagnosis) -
     assert "2 small effects" in text
     assert "- based on the known mass" not in text.split("small effects")[1]
     assert (
-        "torque_gain on elbow is based on the known mass (identification.total_mass, "
-        "identification.known_payload): other inertias would predict as well without torque_gain"
+        "Wrong gain of the measured torque on elbow is based on the known mass "
+        "(identification.total_mass, identification.known_payload): other inertias would predict "
+        "as well without it"
     ) in text
     assert text.count("held-out data cannot test this effect") == 1
 
@@ -320,7 +321,7 @@ def test_what_inertias_take_up_is_told_with_what_settles_it(weighed: Diagnosis) 
     absorbed = tuple(ConfoundedCandidate(kind, ("elbow",), ("Izz[elbow]",), 0.0) for kind in kinds)
     text = printed(replace(weighed, effects=(), absorbed=absorbed))
     told = [line for line in text.splitlines() if " becomes identifiable if " in line]
-    assert [line.split()[0] for line in told] == ["torque_gain", "wrench_gain"]
+    assert [line.split(" of ")[0] for line in told] == ["Wrong gain", "Wrong scale"]
     assert "identification.known_payload" in told[0]
     assert "identification.total_mass" in told[1]
     assert " becomes identifiable if " not in printed(
