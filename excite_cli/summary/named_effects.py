@@ -235,7 +235,8 @@ def joint_alias_in_words(alias: JointAlias, everything: int) -> str:
     single = len(alias.named) == 1
     if alias.same_torque:
         produce = "produces" if single else "produce"
-        return f"{capitalised(named)} {produce} the same torque as {others}: no motion distinguishes them"
+        told = f"{produce} the same torque as {others}: no motion distinguishes them"
+        return f"{capitalised(named)} {told}"
     return f"{capitalised(named)} {'is' if single else 'are'} indistinguishable from: {others}"
 
 
