@@ -30,7 +30,8 @@ class CoupledMotors(SetupCheck):
         """Either motor of a joint and the one that it carries turns with both."""
         first = fit.robot.base_joints
         pairs = [(j, k) for k, j in enumerate(fit.robot.parents) if j >= first]
-        either = [each for j, k in pairs for each in ((j, k), (k, j))]
+        judged = [pair for pair in pairs if explained.judged[list(pair)].all()]
+        either = [each for j, k in judged for each in ((j, k), (k, j))]
         if setup.coupled is None:
             for (other, own), way in product(either, (1.0, -1.0)):
                 coupled = replace(setup, coupled=Coupling(other, own, way))

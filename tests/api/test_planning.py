@@ -83,6 +83,7 @@ def test_not_in_the_time_of_all_the_duration_stays() -> None:
     assert not plan_answer(problem, result, "a.h5").good
 
 
+@pytest.mark.long
 def test_an_interrupted_run_goes_on_with_motions_as_short(two: Result, tmp_path: Path) -> None:
     problem = until(f"until: {{predicted_deviation: {0.7 * between(two)}}}")
     path, planned = tmp_path / "a.h5", []

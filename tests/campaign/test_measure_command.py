@@ -41,6 +41,7 @@ def test_what_it_says_is_kept(tmp_path: Path) -> None:
     assert {"connected", "oh"} == set((tmp_path / "m.txt").read_text().split())
 
 
+@pytest.mark.long
 def test_no_log_and_no_program_are_told(tmp_path: Path) -> None:
     with pytest.raises(NotMeasuredError, match=r"wrote no .*log of m\.csv"):
         MeasureCommand.of(program(tmp_path, "pass")).take(take_in(tmp_path))

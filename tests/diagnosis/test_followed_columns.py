@@ -28,6 +28,8 @@ from tests.diagnosis import simulated_arm
 from tests.diagnosis.simulated_arm import BASE, ELBOW, PITCH, ROBOT, YAW, planted, played
 from tests.diagnosis.test_changes import ALWAYS, RUNS, what
 
+pytestmark = pytest.mark.long
+
 KINDS = (
     "viscous_friction,coulomb_friction,torque_offset,friction_change,friction_drift,"
     "covariate_friction,covariate_offset"
@@ -85,7 +87,6 @@ def followed(found: Diagnosis, joint: str = "shoulder_pitch") -> NamedEffect:
     return one
 
 
-@pytest.mark.long
 def test_the_temperature_is_named_and_the_decoy_is_not(told: Diagnosis) -> None:
     found = followed(told)
     assert {each for each in what(told) if each[1] != "elbow"} == {
@@ -118,7 +119,6 @@ def test_the_temperature_is_named_and_the_decoy_is_not(told: Diagnosis) -> None:
     assert names >= {("covariate_friction", "battery"), ("friction_change", "")}
 
 
-@pytest.mark.long
 def test_with_the_column_the_held_out_error_is_that_of_noise_and_without_it_more(
     told: Diagnosis, untold: Diagnosis
 ) -> None:
@@ -151,7 +151,6 @@ def test_what_was_found_is_stored_and_goes_into_a_config_that_is_identified(
         identify(ROBOT, BASE, with_declared(measured, ["ambient"]), fewer)
 
 
-@pytest.mark.long
 def test_what_fits_no_name_is_told_to_depend_on_the_column(measured: Dataset) -> None:
     keys = [
         "diagnosis.exclude=[viscous_friction, coulomb_friction]",

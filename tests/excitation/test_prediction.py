@@ -93,6 +93,7 @@ def test_condition_numbers_are_those_of_the_criterion_with_that_name(problem: Pr
         stack, own = plain.added_to(stack, alpha), objective.added_to(own, alpha)
 
 
+@pytest.mark.long
 def test_planned_for_the_work_it_is_predicted_better() -> None:
     for_work, for_condition = (
         planned(smoke(f"criterion.kind={kind}", "sequence.motions=1"))

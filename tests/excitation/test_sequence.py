@@ -82,6 +82,7 @@ def test_two_workers_find_the_same(
     assert max(c.iterations for c in counts) == most
 
 
+@pytest.mark.long
 def test_a_worker_killed_on_the_way_changes_nothing(
     problem: Problem, alone: tuple[Motion, ...], two: Processes
 ) -> None:

@@ -71,6 +71,7 @@ def test_every_mesh_lies_inside_few_capsules_of_its_link(name: str, most: int) -
         assert outside.max() < 1e-9, shape.links
 
 
+@pytest.mark.long
 def test_capsules_of_a_humanoid() -> None:
     """Its right arm is the left arm's mesh with a negative scale: its capsules are mirrored."""
     by_name = {c.name: c for c in capsules_of("talos")}

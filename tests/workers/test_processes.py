@@ -64,6 +64,7 @@ def test_tasks_are_taken_when_somebody_is_there_to_do_them(workers: Workers) -> 
     assert workers.map(work.square, 0, iter(())) == []
 
 
+@pytest.mark.long
 def test_the_first_failure_is_raised_or_all_are_kept(workers: Workers) -> None:
     with pytest.raises(ConfigError, match="task 1 is wrong"):
         workers.map(work.fails, 1, [0, 1, 2, 3])
@@ -73,6 +74,7 @@ def test_the_first_failure_is_raised_or_all_are_kept(workers: Workers) -> None:
     assert str(third) == "task 2 is wrong"
 
 
+@pytest.mark.long
 def test_after_a_failure_nobody_waits_for_later_tasks(two: Processes, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="the first is wrong"):
         two.map(work.after_the_next, str(tmp_path), [10, 11])
@@ -118,6 +120,7 @@ def test_workers_that_cannot_be_started_end_all(monkeypatch: pytest.MonkeyPatch)
         workers.map(work.square, 0, [1], keep_failures=True)
 
 
+@pytest.mark.long
 def test_an_interrupt_leaves_nothing_behind() -> None:
     ends: list[int] = []
 
