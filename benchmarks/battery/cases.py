@@ -102,8 +102,8 @@ def plant_of(one: Sized, robot: Robot) -> Plant:
 Label = Callable[[int, int], tuple[str, str]]
 
 
-# Later than the deck, whose draws stay: what two of its kinds are together.
-_LATER = ("gear_loss",)
+# Later than the deck, whose draws stay.
+_LATER = ("gear_loss", "torque_crosstalk", "coupled_armature")
 
 
 @cache
