@@ -27,6 +27,7 @@ from excite_cli.effects.simulated_robot import Push, SimulatedRobot
 from excite_cli.robot.model import Array, Robot
 
 _CELLS = 96  # per run, for the search of the window
+_LOOKED_AT = 1500  # instants of it, at most: a window is found to a sixteenth of a cell
 _SHORTEST = 0.1  # s: what is shorter is a blow or a fault of the record
 _LEAST = 0.1  # N
 _LONGEST = 0.5  # of the run; what lasts longer is no touch
@@ -156,6 +157,8 @@ def _window(
     signals: Signals, residual: Array, joints: tuple[int, ...]
 ) -> tuple[float, float, float] | None:
     """Energy explained, start and end of the best window, all pairs of two grids."""
+    step = max(1, len(signals.t) // _LOOKED_AT)
+    signals, residual = signals.every(step), residual[::step]
     count = len(signals.t)
     if count < 16:
         return None
