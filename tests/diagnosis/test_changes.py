@@ -15,6 +15,7 @@ from excite_cli.measurement.dataset import Dataset
 from tests.diagnosis.simulated_arm import (
     ELBOW,
     PITCH,
+    ROBOT,
     SLIDE,
     YAW,
     PlantedEffect,
@@ -119,7 +120,8 @@ def test_a_robot_that_stays_the_same_and_one_with_a_push() -> None:
     found = told(recorded(), KINDS)
     assert (what(found), changes_in_words(found), found.parts) == (ALWAYS, [], ())
     # A push of a third of a second is found. No other second knows it, nor does another recording.
-    found = told(recorded(planted("contact", (), 20.0, 2, start=2.1, end=2.45)), f"{KINDS},contact")
+    push = planted("contact", tuple(range(ROBOT.n)), 20.0, 2, start=2.1, end=2.45)
+    found = told(recorded(push), f"{KINDS},contact")
     pushes = [e.effect.runs for e in found.effects if e.effect.kind == "contact"]
     assert pushes == [("r2",)]
     assert {each for each in what(found) if each[0] != "contact"} == ALWAYS
