@@ -41,6 +41,8 @@ class CoupledMotors(SetupCheck):
         """Itself, unless the shaft's friction is in both torques."""
         coupled, explained = found.setup.coupled, fit(found.setup)
         assert coupled is not None
+        if not explained.judged[[coupled.other, coupled.own]].all():
+            return
         at = fit.counted(found.setup)[:, [coupled.other, coupled.own]].all(axis=1)
         columns = fit.passive(found.setup)
         shaft = coupled.way * columns[coupled.own][at] @ explained.passive[coupled.own]
