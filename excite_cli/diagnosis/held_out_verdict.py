@@ -58,8 +58,8 @@ def worth_on_held_out(
     found = {}
     for i in traced.chosen:
         rest = traced.judge.without(i, traced.chosen)
-        found_on = traced.candidates[i]
-        joints = [j for j in found_on.effect.joints if j in found_on.rows]
+        candidate = traced.candidates[i]
+        joints = [j for j in candidate.effect.joints if j in candidate.rows]
         worth = worth_beside(held, traced, with_all, rest, joints)
         verdict = worth.verdict
         if traced.judge.identified_by_prior_only(i, rest):

@@ -312,8 +312,8 @@ class CandidateSearch:
     def _in_its_way(self, i: int, gain: float, chosen: list[int]) -> int:
         """The weakest on its joints without which its size is possible; else the member itself.
 
-        Beside friction of √v, none of which was needed, a TX40's friction of coupled gears exceeded
-        the viscous friction that was left: it went, with nine tenths of what had been explained.
+        Beside friction of √v a TX40's friction of coupled gears exceeded the viscous friction that
+        was left: it went, and J rose from 1771 to 5912.
         """
         if self.judge.allowed(self.plain.solve(chosen), chosen, [i]):
             return i

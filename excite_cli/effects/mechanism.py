@@ -148,7 +148,7 @@ class MjcfParts:
 # (`memory->since` is the time from the last instant to this one); it is kept only where all of an
 # instant is finite. `slopes(q, v, a, j, x, y, z, out)` gives x ∂τ/∂q_j + y ∂τ/∂v_j + z ∂τ/∂a_j of
 # the rigid bodies, `tilted(roll, pitch, q, out)` what a turned base adds, `pushed(j, f, q, out)`
-# what a force at the tip does; the template says how.
+# what a force at the frame of joint j does; the template says how.
 
 
 def real(x: float) -> str:
