@@ -19,7 +19,7 @@ class TorqueCrosstalk(Effect):
     """The first joint's torque grows by c · (torque of the second)."""
 
     kind: ClassVar = "torque_crosstalk"
-    title: ClassVar = "share of the second joint's torque in the measured torque of the first"
+    title: ClassVar = "part of the second joint's torque in the first's"
     signature: ClassVar = "a joint's residual has the shape of another joint's torque"
     scope: ClassVar[Scope] = "pair"
     parameters: ClassVar = (
